@@ -34,6 +34,7 @@ class PlayedDrum(Value):
 
     @model_validator(mode="after")
     def _on_the_drum(self) -> Self:
+        """Raise ValueError: the place is at the rim or beyond, or the softest blow is the harder one."""
         x, y = self.place
         if (x * x + y * y if self.drum.shape == "circle" else max(x * x, y * y)) >= 1:
             raise ValueError("place is not on the drum; choose one nearer the centre")
@@ -58,13 +59,14 @@ class Drums(Value):
 
     @model_validator(mode="after")
     def _rise(self) -> Self:
+        """Raise ValueError: notes do not rise, or one is there twice."""
         notes = [drum.note for drum in self.drums]
         if notes != sorted(set(notes)):
             raise ValueError("drums must be listed by rising note, each note once; put them in order")
         return self
 
     def of_key(self, key: int) -> PlayedDrum | None:
-        """The drum that a key plays; None: it has none."""
+        """The drum that a key plays, whatever the instrument's range; None: a key without a pad."""
         if self.keys == "pads":
             return next((drum for drum in self.drums if drum.note == key), None)
         return next((drum for drum in reversed(self.drums) if drum.note <= key), self.drums[0])

@@ -46,6 +46,7 @@ def _safe_name(name: str) -> str:
 
 
 def _lines(text: str) -> str:
+    """The text of a Scala file as it is. Raises ValueError: it has control characters."""
     if not all(c.isprintable() or c in "\r\n\t" for c in text):
         raise ValueError("must be the text of a Scala file, without control characters; save it as plain text")
     return text
@@ -57,7 +58,10 @@ def ranged(low: float, high: float) -> Any:
 
 
 def parameter(id: str) -> Any:
-    """A field with range and default of the table of parameters. In files of instruments a text is no number."""
+    """A field with the range and default of a parameter, by its id.
+
+    In files of instruments a number must not be written as text.
+    """
     declared = OF_INSTRUMENTS.get(id) or OF_CHOICES[id]
     low, high = declared.limits
     return Field(declared.default, ge=low, le=high, strict=id in OF_INSTRUMENTS, allow_inf_nan=False)

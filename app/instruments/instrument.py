@@ -147,14 +147,15 @@ class PluckChoices(Rows, part="pluck"):
 
     @property
     def is_blow(self) -> bool:
-        """Return True if strings set out with speeds."""
+        """Return True if a hammer strikes: strings then begin with speeds in place of displacements."""
         return self.strikes and self.shape in ("gaussian", "raised_cosine")
 
 
 class Pickup(Value):
-    """The place where the string is heard, one point or left and right, as displacement or velocity.
+    """The place where the string is heard, as displacement, velocity or force at the bridge.
 
     Attributes:
+        points: one, or left and right, in lengths of the string.
         aperture_mm: of a magnetic pick-up, the length of string over which it averages.
         flux_mm: of a magnetic pick-up, the displacement for an e-fold growth of its flux: a curve, by
             `engine.kernels.voice`. 0: it grows evenly, without distortion.
@@ -214,7 +215,7 @@ class Noise(Rows, part="noise"):
     """Noise of what touches strings, by `engine.contact`; comparisons of model and truth leave it out.
 
     Attributes:
-        kind: what plucks or strikes.
+        kind: what plucks or strikes, as a finger.
         onset_db, release_db: energy of the noise of a stroke at velocity 100 and of a release, in dB re the first
             0.4 s of a note. The lowest value is off.
     """
@@ -252,7 +253,7 @@ class BodyChoice(Rows, part="body"):
 
 
 class MacroTarget(Value):
-    """A field that a macro changes, by its path, and its values at 0 and 1."""
+    """A field that a macro changes, by its path, as "knobs.tension", and its values at macro positions 0 and 1."""
 
     field: str
     low: Annotated[float, ranged(-1e6, 1e6)]
@@ -267,7 +268,7 @@ class Macro(Value):
     targets: Annotated[tuple[MacroTarget, ...], Field(min_length=1, max_length=MOST_TARGETS)]
 
     def nearest(self, instrument: Instrument) -> float:
-        """The position, 0 … 1, that is nearest to an instrument: the mean over targets, each within its ends."""
+        """The position, 0 … 1, that fits an instrument's values best: the mean over its targets."""
         places = [
             min(1.0, max(0.0, (instrument.value(target.field) - target.low) / (target.high - target.low)))
             for target in self.targets
@@ -286,7 +287,7 @@ class Instrument(Value):
         sympathy_s_kg: conductance of the bridge through which strings at rest ring with those that are played. 0:
             none do. They are the strings of all keys where strings are let ring, else the open strings of a set.
         polarisations: None: strings move in one direction alone, and lose nothing at a bridge.
-        mode: "poly": a string for each key; "guitar": a string for each MIDI channel; "mpe".
+        mode: "poly": a string for each key; "guitar": a string for each MIDI channel; "mpe": a channel for each note.
         bend_by: whether the pitch wheel changes the tension, as a bent string, or the length, as a slide.
         mod_wheel: one of WHEEL, or "none".
         level_db: gain of its sound.
@@ -325,6 +326,7 @@ class Instrument(Value):
 
     @model_validator(mode="after")
     def _strings_fit(self) -> Self:
+        """Raise ValueError: bridge edge or course do not fit the strings, or drums, or each other."""
         has_edge = self.javari.distance_mm > 0
         if has_edge and isinstance(self.strings, Drums):
             raise ValueError("javari.distance_mm: drums have no strings; leave it out")
@@ -340,6 +342,7 @@ class Instrument(Value):
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
+        """Raise ValueError: the range is reversed, or wheel or macros turn what they cannot, or too far."""
         low, high = self.range
         if low > high:
             raise ValueError(f"range: the lowest key {low} is above the highest, {high}; exchange them")

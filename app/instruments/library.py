@@ -115,7 +115,7 @@ def list_instruments(*folders: Path) -> tuple[list[InstrumentEntry], list[str]]:
 
 
 def _free_name(taken: set[str], name: str) -> str:
-    """The name, with a number where it is taken."""
+    """The name, with a number from 2 on where it is taken; `taken`: names after `casefold`."""
     number, free_name = 2, name
     while free_name.casefold() in taken:
         end = f" {number}"

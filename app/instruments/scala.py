@@ -157,6 +157,7 @@ def _octaves(line: str) -> float:
 
 
 def _whole_number(line: str, name: str, low: int, high: int) -> int:
+    """The number at the beginning of a line; `name` is for the error. Raises ValueError: none in low … high."""
     match = _WHOLE.match(line)
     if match is None or len(match.group()) > MOST_DIGITS or not low <= int(match.group()) <= high:
         raise ValueError(f"its {name} is {brief(line)}, and must be a whole number of {low} … {high}")
@@ -164,5 +165,5 @@ def _whole_number(line: str, name: str, low: int, high: int) -> int:
 
 
 def _entry(line: str) -> int | None:
-    """The degree of one key; None where it is unmapped."""
+    """The degree of one key in a line of a mapping; None: the key is left out ("x")."""
     return None if _UNMAPPED.match(line) else _whole_number(line, "entry", -MOST_KEYS, MOST_KEYS)

@@ -19,15 +19,17 @@ def _equal(steps: int, interval: float = OCTAVE) -> list[float]:
 
 
 def _in_octave(pitches: Iterable[float]) -> list[float]:
-    """The pitches in one octave; the first note is the octave."""
+    """The pitches in cents, moved into one octave, ascending; the first note becomes the octave, 1200."""
     return sorted(pitch % OCTAVE or OCTAVE for pitch in pitches)
 
 
 def _fifths(first: int, comma: float = 0.0, narrowed: Collection[int] = ()) -> list[float]:
-    """Twelve notes on a chain of fifths, of which some are narrower by a part of a comma.
+    """Twelve notes on a chain of fifths, in cents above C within an octave, ascending.
 
     Args:
-        first: the place of the first note, in fifths from C; `narrowed`: those of the lower notes of such fifths.
+        first: the place of the first note, in fifths from C.
+        comma: how much smaller the narrowed fifths are, in cents.
+        narrowed: the places of the lower notes of these fifths.
     """
     sizes = {place: FIFTH - comma * (place in narrowed) for place in range(first, first + 11)}
     below = -sum(sizes[place] for place in range(first, 0))

@@ -113,6 +113,11 @@ def read_scala(path: Path) -> str:
 
 
 def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
+    """The notes, within NOTES, that are not left out, ascending, and log₂ of their pitches in Hz, (notes,) each.
+
+    Raises:
+        ValueError: scale or mapping cannot be read; the message names the field.
+    """
     remedy = "give the text of a Scala file, or none"
     scale, mapping = EQUAL_STEPS, Keymap(0, HIGHEST_KEY, MIDDLE_KEY, A4_KEY, choice.a4_hz, 0, ())
     try:
@@ -127,7 +132,7 @@ def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
             raise ValueError(f"leaves out key {mapping.reference}, whose frequency it gives; map it, or name another")
     except ValueError as error:
         raise ValueError(f"{field}: {one_line(str(error), 200)}; {remedy}") from error
-    base = math.log2(mapping.reference_hz) - scale.octaves_of(reference)
+    base = math.log2(mapping.reference_hz) - scale.octaves_of(reference)  # of degree 0
     pitches: dict[int, float] = {}
     for note in range(NOTES[0], NOTES[1] + 1):
         if mapping.first <= min(max(note, 0), HIGHEST_KEY) <= mapping.last:

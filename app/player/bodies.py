@@ -105,9 +105,11 @@ def _own_files() -> dict[str, Path]:
 
 @lru_cache(maxsize=16)
 def _digest(path: Path, time_ns: int, size: int) -> str:
+    """The SHA-256 of a file, in hex, remembered for one time and size of it: a changed file is read again."""
     return hashlib.sha256(read_bounded(path, LARGEST_IMPULSE_BYTES)).hexdigest()
 
 
 @lru_cache(maxsize=16)
 def _read(path: Path, time_ns: int, size: int) -> Impulse:
+    """The impulse response of a file, remembered as by `_digest`."""
     return read_impulse(path)

@@ -38,9 +38,9 @@ from engine.values.ear import Ear
 from engine.voices import CompiledPlayer
 from engine.voices.player import Ringing, Table
 
-STOP_S = 0.03
+STOP_S = 0.03  # the fade of notes that are stopped or released by number
 FOLLOWED = PLAYED[: of.VALUE.pickup_points_0]  # values of an instrument that strings follow by an event each
-BESIDE_STRINGS = ("macros", "amp", "room")  # of which the player's table has nothing
+BESIDE_STRINGS = ("macros", "amp", "room")  # parts of an instrument that are not in the player's table
 
 
 class InstrumentPlayer:
@@ -52,15 +52,17 @@ class InstrumentPlayer:
     Args:
         preset: a preset of many strings.
         rate_hz: of the mixer that it is given to.
-        gains: by source ("model", "truth"), of all its notes.
+        gains: by source, "model" (what was learned) or "truth" (the solver), the factor of all its notes.
         ear: where strings are heard; None: at the instrument's own points.
         most_notes: that ring at once; the oldest makes room.
         varied: whether plucks vary from stroke to stroke, as the instrument says; the same strokes vary alike.
-        keys: of this instrument and ear, where they are there already.
+        keys: of this instrument and ear, where they are prepared already; None: they are prepared here.
 
     Attributes:
         keys: what is played: strings or drums of an instrument, and where they are heard.
         of_drums: it can hold drums; else it holds strings.
+        table: `keys` as the kernels read them.
+        compiled: plays events in the mixer's thread.
 
     Raises:
         ValueError: the preset learned one string only, or the tuning is impossible.
@@ -85,11 +87,11 @@ class InstrumentPlayer:
         self.rate_hz = rate_hz
         self.grid_points = preset.info.grid_points
         self.most_notes = most_notes
-        self._sources = tuple(gains)
+        self._sources = tuple(gains)  # their order gives the kernels' numbers of them
         self.of_drums = isinstance(instrument.strings, Drums)
-        self._programs = programs_of(preset, rate_hz, self._sources, self.of_drums)
+        self._programs = programs_of(preset, rate_hz, self._sources, self.of_drums)  # one a source
         self._lock, self._varied = threading.Lock(), varied
-        self._serial = self._instrument = 0
+        self._serial = self._instrument = 0  # counts of tables, and of changes of instrument, so far
         self._wheel = 0, 0  # the modulation wheel as events have left it, and the channel that moved it
         self.table: Table | None = None
         modes = of.MOST_DRUM_MODES if self.of_drums else min(of.MOST_MODES, self.grid_points - 2)
@@ -99,7 +101,10 @@ class InstrumentPlayer:
         self.take(self.keys)
 
     def again(self, rate_hz: int) -> InstrumentPlayer:
-        """The same for another mixer, with wheels and pedals as they stand. Its keys are taken over."""
+        """A player of the same instrument for another mixer, with wheels and pedals as they stand here.
+
+        It takes over the prepared keys. Notes that ring stay in this player.
+        """
         gains = {source: self.compiled.source_gain(place) for place, source in enumerate(self._sources)}
         player = InstrumentPlayer(
             self.instrument, self.preset, rate_hz, gains, self.ear, self.most_notes, self._varied, self.keys
@@ -116,7 +121,7 @@ class InstrumentPlayer:
 
     @property
     def ear(self) -> Ear:
-        """The place where strings are heard that are struck now."""
+        """The listening points and the pick-up of strings that are struck from now on."""
         return self.keys.ear
 
     @property
@@ -126,7 +131,7 @@ class InstrumentPlayer:
 
     @property
     def at_hand(self) -> list[Event]:
-        """The events that bring wheels and pedals of a new player where they stand."""
+        """The events that set wheels, pedals and tuning of a new player as they stand here; none for any at rest."""
         state_events: list[Event] = []
         for number in range(of.CHANNELS):
             channel = self.compiled.channel(number)
@@ -199,7 +204,8 @@ class InstrumentPlayer:
         Another instrument begins with its wheels at rest, for they may turn something else now; pedals stay.
 
         Args:
-            table: of these keys, where it is there already.
+            table: of these keys, where it is there already; None: it is made here.
+            frame: of the mixer; 0: at once.
         """
         table = table or self.table_of(keys)
         with self._lock:
@@ -213,9 +219,12 @@ class InstrumentPlayer:
             self.compiled.take(table, frame)
 
     def turn(self, keys: StringKeys | DrumKeys, frame: int = 0) -> bool:
-        """Play keys of the same instrument with turned knobs by an event each, as a plug-in does, if possible.
+        """Change to keys of the same instrument with turned knobs, by one event for each turned value.
 
-        False: they need another table, see `take`.
+        Return False, with nothing changed, where they need another table: see `take`.
+
+        Args:
+            frame: of the mixer, from which on they count; 0: at once.
         """
         with self._lock:
             values = (
@@ -236,7 +245,9 @@ class InstrumentPlayer:
         return (keys.of_key(key) if isinstance(keys, DrumKeys) else keys.pitch_hz(key)) is None
 
     def handle(self, event: Event, frame: int = 0, struck_s: float = 0.0) -> int:
-        """Hand an event over; its number, which the reports of a note carry. 0 for a pluck at a place: no key's.
+        """Hand an event over, and return its number, which the reports of a note carry.
+
+        The number is 0 for a turned instrument, and for a pluck at a place, which no key plays.
 
         Args:
             frame: of the mixer, at which it counts: a note begins with it, all else within a quantum after it. 0: at
@@ -276,7 +287,7 @@ class InstrumentPlayer:
         return give(of.CONTROLLER, key=event.number, value=event.value)
 
     def _check(self, event: NoteOn) -> None:
-        """Raise ValueError: no string on which an event may play its key is possible."""
+        """Raise ValueError if none of the strings on which a note may play its key is possible."""
         string = event.channel if event.string is None else event.string  # its own, or that of its channel, if any
         if event.string is not None or string < _strings_by_channel(self.instrument):
             with contextlib.suppress(ValueError):
@@ -285,13 +296,20 @@ class InstrumentPlayer:
         self.keys.of_key(event.key)
 
     def _struck(self, event: NoteOn) -> NDArray[np.float64] | None:
-        """The effect of a blow at a place of its own on a drum's modes; None: the drum's own place."""
+        """The speeds (modes,) that a blow of 1 N s at the note's own place gives to a drum's modes.
+
+        None: the drum is struck at its usual place, or there is no drum.
+        """
         if event.place is None or not isinstance(self.keys, DrumKeys):
             return None
         drum_key = self.keys.of_key(event.key)
         return None if drum_key is None else drum_key.struck(event.place)
 
     def _follow_wheel(self, event: ControlChange) -> None:
+        """Keep the modulation wheel's position and channel, for `heard_through`; a reset puts it to rest.
+
+        The reset counts on the channel that moved the wheel, and in MPE on the master channel too.
+        """
         moved_by = self._wheel[1]
         if event.number == midi.MOD_WHEEL:
             self._wheel = event.value, event.channel
@@ -301,7 +319,7 @@ class InstrumentPlayer:
                 self._wheel = 0, moved_by
 
     def cancel(self, note: int = 0) -> None:
-        """Forget the events whose frames are to come, or those of one note, by its number."""
+        """Forget the events whose frames are still to come; `note`: of one note alone, by its number; 0: of all."""
         self.compiled.give(of.CANCEL, note=note)
 
     def stop(self, seconds: float = STOP_S) -> None:
@@ -313,7 +331,7 @@ class InstrumentPlayer:
         self.compiled.give(of.CHOKE, of.ANY, of.ANY, seconds, frame, note=note)
 
     def slid(self, note: Ringing) -> float:
-        """The semitones above its key where a note's string is stopped now, as while it slides."""
+        """The semitones above its key where a note's string is stopped now, as while it slides; 0 for a drum."""
         keys = self.keys
         if note.length_m is None or isinstance(keys, DrumKeys):
             return 0.0
@@ -324,9 +342,10 @@ class InstrumentPlayer:
 
 
 def turned_values(instrument: Instrument, than: Instrument) -> dict[str, float] | None:
-    """The values, by their ids, in which an instrument's strings differ from another's, as the player follows them.
+    """The new values, by parameter id, in which an instrument differs from another, for one event each.
 
-    None: they differ in more, or in how far the modulation wheel turns one.
+    None: it differs also in what no event can change, or in the value at the modulation wheel's end. BESIDE_STRINGS
+    are left out.
     """
     values: dict[str, float] = {}
     for name in Instrument.model_fields:
@@ -349,6 +368,6 @@ def is_another(instrument: Instrument, than: Instrument) -> bool:
 
 
 def _strings_by_channel(instrument: Instrument) -> int:
-    """The number of strings of a set that channels of a guitar may choose."""
+    """The number of strings that MIDI channels may choose, one each; 0 where the instrument is not in guitar mode."""
     by_channel = instrument.mode == "guitar" and isinstance(instrument.strings, StringSet)
     return min(of.GUITAR_STRINGS, len(instrument.strings.strings)) if by_channel else 0  # type: ignore[union-attr]

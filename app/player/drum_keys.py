@@ -34,8 +34,10 @@ class DrumKey:
     """The drum of a key.
 
     Attributes:
+        key: of MIDI.
+        played: the drum with its mallet, place and speeds, as they are for this key.
         modes: with the instrument's knobs, tuned to the key.
-        points: where it is heard.
+        points: where it is heard, as in `Ear.points`.
     """
 
     key: int
@@ -58,7 +60,7 @@ class DrumKey:
         return Strike(played.place, speed, played.mallet)
 
     def drop_cents(self, velocity: float, curve: float = 0.0) -> float:
-        """The fall of the pitch of the first mode after a blow, in cents."""
+        """The fall of the pitch of the first mode after a blow of a velocity in 1 … 127, in cents."""
         speeds = self.strike(velocity, curve).speeds(self.modes)
         resonator = self.modes.resonator(np.zeros((1, 2)))
         rise = float(resonator.relative_tension_rise(speeds / self.modes.omega)) / 2  # ΔT/T₀ over the first swing
@@ -75,17 +77,21 @@ def on_the_drum(played: PlayedDrum, place: tuple[float, float]) -> tuple[float, 
 class DrumKeys:
     """The keys of an instrument of drums, heard at `ear`; see `StringKeys`. Modes of a drum are remembered."""
 
-    polarisations = None
+    polarisations = None  # drums have none; read by `table_of`
 
     def __init__(self, instrument: Instrument, ear: Ear, near: DrumKeys | None = None) -> None:
-        """Raise ValueError: the tuning is impossible, or a drum."""
+        """Raise ValueError: the tuning or a drum is impossible.
+
+        Args:
+            near: keys of nearly the same instrument, of which the body's curves are taken instead, in no time.
+        """
         assert isinstance(instrument.strings, Drums)
         self.instrument = instrument
         self.ear = ear
         self.drums = instrument.strings
         self._tuning = Tuning(instrument.tuning)
         self.body: Array | None = body_curves(instrument) if near is None else near.body
-        self._known: dict[int, DrumKey | None] = {}
+        self._known: dict[int, DrumKey | None] = {}  # by key; None: silent
 
     def of_key(self, key: int, string: int | None = None) -> DrumKey | None:
         """The drum of a key, remembered; None for a silent key. Raises ValueError: the key has no possible drum."""
@@ -95,7 +101,7 @@ class DrumKeys:
         return self._known[key]
 
     def tuned_to(self, key: int) -> tuple[PlayedDrum, float] | None:
-        """The drum that a key plays, with its mallet's speeds there, and by what ratio it is tuned; None: silent."""
+        """The drum that a key plays, with its mallet's speeds there, and the ratio of its tuning; None: silent."""
         low, high = self.instrument.range
         played = self.drums.of_key(key)
         if played is None or not low <= key <= high or not self._tuning.mapped(key):
@@ -107,6 +113,7 @@ class DrumKeys:
         return played.model_copy(update=speeds), ratio
 
     def _drum_key(self, key: int, played: PlayedDrum, ratio: float) -> DrumKey:
+        """The drum of a key, with the instrument's knobs, raised in pitch by a ratio. Raises ValueError."""
         knobs, drum = self.instrument.knobs, played.drum
         d1, d3 = drum.damping_d1_kg_m2_s * knobs.decay, drum.damping_d3_kg_s * knobs.brightness_decay
         modulus_pa = drum.youngs_modulus_pa * knobs.modulus
@@ -138,7 +145,7 @@ def block_of(drum_key: DrumKey) -> Array:
 
 
 def struck_drum(played: PlayedDrum, drum: DrumParameters) -> Array:
-    """A drum with its blow, as the kernels have it."""
+    """The numbers of a drum and of its blow, (21,), in the order of `engine.kernels.drum_modes`."""
     mallet, place = played.mallet, on_the_drum(played, played.place)
     blow = *place, mallet.mass_kg, mallet.radius_m, mallet.contact_s, played.softest_m_s, played.hardest_m_s
     return np.concatenate([numbers_of(drum), blow])

@@ -66,7 +66,7 @@ def body_curves(instrument: Instrument) -> NDArray[np.float64] | None:
 
 
 def _body(chosen: BodyChoice) -> tuple[Body | None, str]:
-    """The body, and why it cannot be used."""
+    """The chosen body and ""; or None and the reason why it cannot be used, "" where no body is chosen."""
     if not chosen.name or chosen.mix == 0:
         return None, ""
     if chosen.name in BODIES:

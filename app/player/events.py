@@ -33,11 +33,11 @@ _FIXED = {  # functions of controllers that no instrument changes; those from 12
     **dict.fromkeys((midi.REGISTERED, midi.FINE_REGISTERED, midi.OTHER, midi.FINE_OTHER), _PARAMETER),
     **dict.fromkeys(range(midi.SOUND_OFF, 128), "stops or resets what is played"),
 }
-BEND_STEPS = 8_192
+BEND_STEPS = 8_192  # of MIDI's pitch wheel, from rest to an end
 NOTE_OFF, NOTE_ON, KEY_PRESSURE, CONTROLLER, PROGRAM, PRESSURE, BEND = range(0x80, 0xF0, 0x10)  # kinds of messages
 LONGEST_RECORDING = 100_000  # events
 TEMPOS_BPM = 30, 300  # the slowest and the fastest
-EARLY_S = 0.12  # before the first beat, at which a key that is struck so late in the count-in counts
+EARLY_S = 0.12  # before the first beat: keys struck in this last part of the count-in are kept
 KEYS = 16  # what is played on the computer's keys and on the screen: no channel of MIDI's
 Number = Annotated[int, ranged(0, 127)]  # of MIDI
 Channel = Annotated[int, ranged(0, KEYS)]
@@ -145,7 +145,10 @@ def event_of(message: Sequence[int]) -> Event | None:
 
 
 def message_of(event: Event) -> list[int]:
-    """The bytes of an event as a message, as of `event_of`; empty where MIDI has no message for it."""
+    """The bytes of an event as a MIDI message, the reverse of `event_of`; empty where MIDI has none for it.
+
+    An event on KEYS is sent on channel 0.
+    """
     if isinstance(event, InstrumentTurned | PluckAt):
         return []
     channel = 0 if event.channel == KEYS else event.channel % 16
@@ -174,7 +177,12 @@ def release_all(channels: Iterable[int]) -> list[Event]:
 
 
 def parameter_set(number: int, value: int, fine_value: int, channel: int) -> list[Event]:
-    """The events that set a registered parameter of a channel, and then choose none."""
+    """The events that set a registered parameter of a channel, and then choose none.
+
+    Args:
+        number: of the parameter, as BEND_RANGE.
+        value, fine_value: the upper and the lower seven bits.
+    """
     messages = (
         (midi.REGISTERED, 0),
         (midi.FINE_REGISTERED, number),
@@ -194,7 +202,7 @@ def bend_range(semitones: float, channel: int) -> list[Event]:
 def releases_for(events: Iterable[Event]) -> list[Event]:
     """The events that release the keys and pedals that are down after these events.
 
-    There is one for each stroke of a key.
+    A key that was struck twice without a release gets two; on a string of its own it gets one.
     """
     down: dict[NoteOff | ControlChange, int] = {}  # strokes without a release, in the order of the latest
     for event in events:

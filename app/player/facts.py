@@ -50,7 +50,10 @@ def t60_s(string: StringParameters, mode: int, instrument: Instrument) -> float:
 
 
 def by_two_numbers(instrument: Instrument, string: StringParameters) -> StringParameters:
-    """The string with d₁ and d₃ in place of losses by mode: alike at its first partial and near BRIGHT_HZ."""
+    """The string with losses by d₁ and d₃ alone, whose decay rates are right at the first partial and near BRIGHT_HZ.
+
+    The string itself where the instrument has no losses by mode.
+    """
     if instrument.losses is None:
         return string
     bright = max(2, bright_mode(string))
@@ -131,7 +134,7 @@ def knob_for(instrument: Instrument, key: tuple[int, int | None], field: str, fi
         trial = instrument.model_copy(update={"knobs": instrument.knobs.model_copy(update={name: middle})})
         try:
             key_string = Strings(trial).of_key(*key)
-        except ValueError:  # there is no such string, as there is one at 1
+        except ValueError:  # an impossible string: go towards 1, where the string is possible
             above = middle > 1
         else:
             if key_string is None:
@@ -147,6 +150,8 @@ def outside_of_key(info: PresetInfo, instrument: Instrument, event: NoteOn, stri
     Wheels and slides are left out.
 
     Args:
+        info: of the preset that plays it.
+        event: the struck key and its velocity.
         string: on which of a set it is played, as of `Strings.of_key`.
     """
     try:

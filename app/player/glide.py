@@ -46,8 +46,9 @@ def glides_cents(instrument: Instrument) -> NDArray[np.float64]:
     strings = Strings(instrument)
     plucks = [instrument.pluck.pluck(velocity) for velocity in range(VELOCITIES[1] + 1)]
     amplitudes_mm = np.array([pluck.amplitude_mm for pluck in plucks])
-    shapes_m = np.stack([pluck.displacement(GRID_POINTS) for pluck in plucks])
-    modal_m = shapes_m @ analysis_matrix(GRID_POINTS, MOST_MODES)
+    shapes_m = np.stack([pluck.displacement(GRID_POINTS) for pluck in plucks])  # (velocities, grid points)
+    modal_m = shapes_m @ analysis_matrix(GRID_POINTS, MOST_MODES)  # (velocities, modes)
+    # by velocity: factor from a pluck's amplitudes to a blow's
     blows = [blow_factor(np.ones(1), shape) for shape in shapes_m / (amplitudes_mm[:, None] / 1000)]
     glides = np.full((HIGHEST_KEY + 1, len(plucks)), np.nan)
     low, high = instrument.range
@@ -57,7 +58,7 @@ def glides_cents(instrument: Instrument) -> NDArray[np.float64]:
         except ValueError:
             continue
         if string is not None:
-            pulled = np.minimum(string.shortened, LARGEST_AMPLITUDE_MM / amplitudes_mm)
+            pulled = np.minimum(string.shortened, LARGEST_AMPLITUDE_MM / amplitudes_mm)  # factors, (velocities,)
             sets_out_m = modal_m[:, : string.modes] * pulled[:, None]
             if instrument.pluck.is_blow:
                 omega = undamped_frequencies(string.parameters, string.modes)

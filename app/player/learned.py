@@ -40,9 +40,9 @@ from training.recording.preset import Source, body_response, listening_point, re
 from training.recording.table import as_data
 
 CATEGORIES: dict[Kind, Category] = {"guitar": "guitar", "bass": "bass", "harp": "harp", "piano": "keys"}
-REACH_KEYS = 12  # an octave to both sides of the recorded note
+REACH_KEYS = 12  # range of the instrument: an octave to both sides of the recorded note
 BODY_RATE_HZ = 48_000
-HARDEST = 1.5  # of the recorded pluck's amplitude
+HARDEST = 1.5  # amplitude of velocity 127, over that of the recorded pluck
 RECORDED_VELOCITY = 100
 _NAME: TypeAdapter[str] = TypeAdapter(Name)
 
@@ -117,7 +117,7 @@ def reasons_against(path: Path) -> Reasons:
         NoteFileError, RecordingError: nothing can be learned from it in any case.
     """
     file = read_note(path)
-    words: dict[bool, list[str]] = {True: [], False: []}
+    words: dict[bool, list[str]] = {True: [], False: []}  # by whether the reason is a refusal
     for finding in examined(file.samples, file.rate_hz).findings:
         words[finding.refused].append(f"{finding.reason}: {finding.remedy}")
     return Reasons(words[True], words[False])
@@ -205,6 +205,15 @@ def _all_or_none(*paths: Path) -> Iterator[None]:
 
 
 def _instrument(name: str, stem: str, learned: Learned, partials: int, kind: Kind) -> Instrument:
+    """The instrument of a learned string, which plays the recorded pluck at RECORDED_VELOCITY.
+
+    Args:
+        stem: the name of its preset and its body.
+        partials: how many were learned, for the listening point.
+
+    Raises:
+        InstrumentError: a learned value is out of the bounds of instruments.
+    """
     key = round(69 + 12 * math.log2(learned.physics.f0_hz / 440))
     amplitude_mm = 1000 * learned.strung.amplitude_m
     hardest_mm = min(10.0, HARDEST * amplitude_mm)

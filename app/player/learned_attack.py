@@ -30,11 +30,14 @@ from training.recording.note import Note
 
 Array = NDArray[np.float64]
 
-LEAST_GAIN_DB = 0.2  # of distance, for an attack that is on
+LEAST_GAIN_DB = 0.2  # an attack is on if it brings the sound nearer to the recording by more
 
 
 def attack_of(instrument: Instrument, note: Note, recorded: RecordedNote) -> tuple[RecordedAttack, float] | None:
-    """The attack of a note and its energy, in dB re that of the note's first 0.4 s. None: there is nothing."""
+    """The attack of a note and its energy, in dB re that of the note's first 0.4 s.
+
+    None: the instrument has no body, or the note no attack.
+    """
     body = _body_impulse(instrument)
     if body is None:
         return None
@@ -48,7 +51,13 @@ def attack_of(instrument: Instrument, note: Note, recorded: RecordedNote) -> tup
 
 
 def with_attack(instrument: Instrument, preset: Preset, note: Note, f0_hz: float, level_db: float) -> Instrument:
-    """The instrument whose strokes have the recorded attack: at its level where that is nearer, else off."""
+    """The instrument whose strokes have the recorded attack: on where that is nearer to the note, else off.
+
+    Args:
+        preset: with the attack in it.
+        note, f0_hz: the recording and its pitch.
+        level_db: energy of the attack, as of `attack_of`.
+    """
     body = _body_impulse(instrument)
     recorded = preset.info.recorded
     assert body is not None and recorded is not None and recorded.attack is not None

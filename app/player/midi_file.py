@@ -48,7 +48,7 @@ from engine.whole_file import UnusableFile, read_bounded
 LARGEST_BYTES = 4 * 2**20
 MOST_EVENTS = 400_000  # an hour of 50 notes a second, with releases
 LONGEST_S = 3_600.0
-AFTER_LAST_NOTE_S = 60.0  # later than a song's last note by more, no event counts
+AFTER_LAST_NOTE_S = 60.0  # events later than this after the last note are left out
 TICKS, TEMPO = 960, 500_000  # of a quarter note; µs
 MEMBER_SEMITONES = 48.0  # range of bends of MPE's members
 
@@ -81,6 +81,7 @@ def read_midi(path: Path) -> list[TimedEvent]:
 
 
 def _messages_in(path: Path) -> MidiMessages:
+    """The channel messages of a file. Raises MidiFileError: it cannot be read, or is no MIDI file."""
     try:
         return read_messages(read_bounded(path, LARGEST_BYTES), MOST_EVENTS)
     except UnusableFile as error:
@@ -92,6 +93,7 @@ def _messages_in(path: Path) -> MidiMessages:
 
 
 def _events_of(path: Path, messages: MidiMessages) -> list[TimedEvent]:
+    """The events of the messages of a file, as `read_midi` returns them; `path` is for errors alone."""
     timed_events: list[TimedEvent] = []
     notes, last_note_s = False, 0.0
     for time_s, message in messages.timed:
@@ -110,7 +112,7 @@ def _events_of(path: Path, messages: MidiMessages) -> list[TimedEvent]:
 
 
 def _ignored_messages(messages: MidiMessages, follows_programs: bool = False) -> list[str]:
-    """The messages that change nothing here, in words."""
+    """Phrases for the messages that change nothing; `follows_programs`: program changes do choose instruments."""
     left_out = []
     if messages.missing_tracks:
         left_out.append(f"{_count(messages.missing_tracks, 'track')} that its header counts")
@@ -167,9 +169,9 @@ def read_parts(path: Path) -> tuple[list[tuple[Instrument, SongPart]], str]:
     messages = _messages_in(path)
     timed = _events_of(path, messages)
     changes = deque((time_s, message) for time_s, message in messages.timed if message[0] & 0xF0 == PROGRAM)
-    playing = dict.fromkeys(range(16), (FIRST.stem, "")) | {DRUMS: (KIT, "drums")}
+    playing = dict.fromkeys(range(16), (FIRST.stem, "")) | {DRUMS: (KIT, "drums")}  # channel: file, words
     channels: dict[int, list[TimedEvent]] = defaultdict(list)
-    notes: dict[tuple[int, str], dict[int, str]] = defaultdict(dict)  # by channel and instrument: place and program
+    notes: dict[tuple[int, str], dict[int, str]] = defaultdict(dict)  # by channel and file: place, program's words
     for entry in timed:
         while changes and changes[0][0] <= entry.time_s:
             status, program, _ = changes.popleft()[1]
@@ -197,7 +199,12 @@ def read_parts(path: Path) -> tuple[list[tuple[Instrument, SongPart]], str]:
 def _part(
     path: Path, instrument: Instrument | None, timed: list[TimedEvent], ignored: list[str], words: str = ""
 ) -> SongPart:
-    """The part of these events that an instrument plays; see `read_song`."""
+    """The part of these events that an instrument plays; see `read_song`.
+
+    Args:
+        ignored: phrases for messages that change nothing.
+        words: what follows the file's name in `left_out`.
+    """
     mode = instrument.mode if instrument is not None else "poly"
     notes_on = {entry.event.channel for entry in timed if isinstance(entry.event, NoteOn)}
     pads = instrument is not None and isinstance(instrument.strings, Drums) and instrument.strings.keys == "pads"
@@ -221,7 +228,11 @@ def _part(
 
 
 def _song(name: str, instrument: Instrument | None, timed: list[TimedEvent], left_out: list[str]) -> SongPart:
-    """The song; `left_out` with the notes for which the instrument has no sound."""
+    """The song of these events.
+
+    Args:
+        left_out: phrases for what is not played; the number of notes without a sound is added.
+    """
     keys = [entry.event.key for entry in timed if isinstance(entry.event, NoteOn)]
     if instrument is not None and (silent := _count_silent(instrument, keys)):
         low, high = (note_name(key) for key in instrument.range)
@@ -285,7 +296,10 @@ def midi_bytes(
 
 
 def _with_ranges(timed: Sequence[TimedEvent], instrument: Instrument) -> list[TimedEvent]:
-    """The events with messages for the range of bends, where a channel has the instrument's and not its own."""
+    """The events, with messages that set the range of bends of each channel as the instrument has it.
+
+    A channel whose own messages set a parameter is left alone from then on, until it is reset.
+    """
     channels = sorted(channels_in(entry.event for entry in timed))
     with_own_range = set[int]()
     track = list[TimedEvent]()

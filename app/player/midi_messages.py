@@ -95,7 +95,7 @@ class _Clock:
     """Ticks in s, by a header's division and the tempo."""
 
     def __init__(self, division: int) -> None:
-        self._by_frames = bool(division & 0x8000)
+        self._by_frames = bool(division & 0x8000)  # ticks are parts of SMPTE's frames, not of a quarter note
         if self._by_frames:
             rate, ticks = 256 - (division >> 8), division & 0xFF
             if rate not in FRAME_RATES_HZ or ticks == 0:
@@ -105,10 +105,13 @@ class _Clock:
             raise NotMidi("counts no ticks in a quarter note (a division of 0)")
         else:
             self._ticks = division
-            self._tick_s = USUAL_TEMPO_US / 1e6 / division
+            self._tick_s = USUAL_TEMPO_US / 1e6 / division  # by the latest tempo
 
     def timed(self, ticked: list[tuple[int, int | Message]]) -> Iterator[tuple[float, Message]]:
-        """Channel messages with their times. A tempo of 0 is none, and none counts where frames are counted."""
+        """Channel messages with their times in s, of (tick, message or tempo in µs a quarter note) by rising tick.
+
+        A tempo of 0 is ignored, and so is any where ticks are parts of frames.
+        """
         time_s, before = 0.0, 0
         for tick, message in ticked:
             time_s += (tick - before) * self._tick_s
@@ -120,7 +123,7 @@ class _Clock:
 
 
 class _Reader:
-    """The tracks of a file.
+    """A reader of the tracks of a file; places are bytes from its beginning.
 
     Attributes:
         ticked: ticks from the beginning, and a channel message or a tempo in µs, track by track.
@@ -129,12 +132,12 @@ class _Reader:
     def __init__(self, raw: bytes, most_messages: int) -> None:
         self._raw = raw
         self._most = most_messages
-        self._left = most_messages  # of these
+        self._left = most_messages  # how many may still be read
         self.ticked: list[tuple[int, int | Message]] = []
         self.tracks = self.clipped = self.skipped = 0
 
     def read_tracks(self, place: int) -> None:
-        """All tracks from a place on, whatever stands between them."""
+        """Read all tracks from a place on, whatever stands between them."""
         raw = self._raw
         while 0 <= place <= len(raw) - 8:
             end = place + 8 + int.from_bytes(raw[place + 4 : place + 8], "big")
@@ -153,14 +156,16 @@ class _Reader:
         return kind == b"MTrk" or (named and place + 8 + length <= len(self._raw))
 
     def _read_track(self, place: int, end: int) -> int:
-        """Read a track of a length that may be wrong.
+        """Read a track of a length that may be wrong; return the place where the next chunk may begin.
 
-        Returns the place at which the next chunk is to be looked for.
+        Args:
+            place: of its first message.
+            end: the place behind it by the length that it states.
         """
         raw, length_is_right = self._raw, end == len(self._raw) or self._begins_chunk(end)
         limit = end if length_is_right else len(raw)
         tick = running = 0
-        up_to_end = None  # messages that lie within the length that the track says it has
+        up_to_end = None  # count of messages and place where the stated length was passed; None: not yet
         try:
             while place < limit:
                 if up_to_end is None and place >= end:
@@ -184,7 +189,15 @@ class _Reader:
         return limit
 
     def _read_message(self, tick: int, running: int, place: int, limit: int) -> tuple[int, int, bool]:
-        """The running status from here on, the place behind the message, and whether it ends the track."""
+        """Read a message and keep it, if it is a channel message or a tempo.
+
+        Args:
+            running: the status of a message that has none of its own; 0: none yet.
+            limit: the place that a message may not pass.
+
+        Returns:
+            The running status from here on, the place behind the message, and whether it ends the track.
+        """
         raw = self._raw
         if place >= limit:
             raise _CutOff("is no MIDI file, or not a whole one: a track ends within a message")
@@ -227,7 +240,7 @@ class _Reader:
         self.ticked.append((tick, (status, min(first, LARGEST_VALUE), min(second, LARGEST_VALUE))))
 
     def _number(self, place: int, limit: int) -> tuple[int, int]:
-        """A number of variable length, and the place after it."""
+        """A number of variable length (seven bits a byte), and the place after it."""
         value = 0
         for at in range(place, min(place + LONGEST_NUMBER, limit)):
             value = value << 7 | self._raw[at] & 0x7F

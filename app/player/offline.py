@@ -31,7 +31,8 @@ class OfflinePlayer:
     """A player and a mixer without a device.
 
     Args:
-        gains: of the sources that are heard together; a difference, of two, is heard without body and room.
+        gains: by source, the factor of each that is heard; two of them are a difference, without body and room.
+        limited: through the limiter.
         varied: whether plucks vary from stroke to stroke; those of a difference do not.
         dry: without amplifier, body and room.
 
@@ -55,16 +56,18 @@ class OfflinePlayer:
             instrument, preset, rate_hz, gains, most_notes=MOST_RINGING, varied=varied and not compared
         )
         self.mixer.set_player(self.player.compiled)
-        self._dry = compared or dry
+        self._dry = compared or dry  # effects are left out
         self.tail_s = 0.0
         self._set_effects()
 
     def handle(self, event: Event, frame: int) -> None:
+        """Play an event at a frame of the mixer, and change the effects where it moves them."""
         self.player.handle(event, frame)
         if moves_effects(event, self.player.instrument):
             self._set_effects()
 
     def _set_effects(self) -> None:
+        """Set the effects as knobs and wheel stand; `tail_s` becomes the longest of all so far."""
         instrument = self.player.heard_through
         effects = None if self._dry else effects_of(instrument)
         self.mixer.set_effects(effects)
@@ -105,9 +108,9 @@ def render_events(
     channels, delay = channels_played(instrument, timed), AHEAD if limited else 0
     done, events = 0, sorted(timed, key=lambda timed_event: timed_event.time_s)
     sounding = [place for place, entry in enumerate(events) if isinstance(entry.event, NoteOn | NoteOff)]
-    tail = sounding[-1] + 1 if sounding else 0
+    tail = sounding[-1] + 1 if sounding else 0  # number of events up to the last note or release
 
-    def blocks_until(frame: int) -> Iterator[NDArray[np.float32]]:
+    def blocks_until(frame: int) -> Iterator[NDArray[np.float32]]:  # sound up to a frame, less the limiter's delay
         nonlocal done
         while done < frame:
             block = stage.mixer.render(min(BLOCK_FRAMES, frame - done))
@@ -115,6 +118,7 @@ def render_events(
             if done > delay:
                 yield block[max(0, delay - done + len(block)) :, :channels]
 
+    # sound up to a frame, with these events on the way
     def play_until(frame: int, few: Sequence[TimedEvent]) -> Iterator[NDArray[np.float32]]:
         for timed_event in few:
             at = round(timed_event.time_s * rate_hz)

@@ -25,6 +25,7 @@ from engine.resonators.string import decay_rates as law_rates
 from engine.values.ear import Ear
 from engine.values.string import StringParameters
 
+# names of the knobs, in the order of the kernels
 KNOBS = tuple(id.removeprefix("knobs.") for id in PLAYED[: of.KNOBS])
 
 
@@ -92,7 +93,14 @@ class Strings:
         return self._tuning.hz(note)
 
     def _stopped(self, key: int, number: int | None, pitch_hz: float) -> tuple[StringParameters, float]:
-        """The string of a key with the instrument's knobs, and its length as a share of the whole string's."""
+        """The string of a key with the instrument's knobs, shortened or slackened to a pitch.
+
+        Args:
+            number: of the string in a set, from the highest, 0; None: the key chooses.
+
+        Returns:
+            The string, and its length as a share of the whole string's.
+        """
         strings, slackened = self.instrument.strings, 1.0
         assert not isinstance(strings, Drums)
         if isinstance(strings, Fretted):
@@ -136,13 +144,17 @@ class StringKeys(Strings):
             raise ValueError(f"{instrument.name} has drums, and no strings; choose an instrument of strings")
         super().__init__(instrument)
         self.ear = ear
-        self.recorded = preset.recorded
+        self.recorded = preset.recorded  # what a recording adds to the string; None: nothing was recorded
         # a recorded string moves as its recording says
         self.polarisations = instrument.polarisations if preset.recorded is None else None
         self.body: Array | None = body_curves(instrument) if near is None else near.body
 
     def of_key(self, key: int, string: int | None = None) -> KeyString | None:
-        """The string of a key as of `Strings`. Raises ValueError: it cannot be heard or played so, too."""
+        """The string of a key, as of `Strings`.
+
+        Raises:
+            ValueError: as there; or a mode is overdamped, or a recorded string would be heard at the bridge.
+        """
         key_string = super().of_key(key, string)
         if key_string is None:
             return None
@@ -154,5 +166,5 @@ class StringKeys(Strings):
 
 
 def on_string(string: KeyString, pluck: Pluck) -> Pluck:
-    """A pluck of the whole string, on the string that a key leaves of it."""
+    """A pluck of the whole string, with its amplitude reduced for the part that a key leaves of the string."""
     return replace(pluck, amplitude_mm=min(pluck.amplitude_mm * string.shortened, LARGEST_AMPLITUDE_MM))

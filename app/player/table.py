@@ -33,7 +33,7 @@ from engine.voices.programs import (
     tension_memory,
 )
 
-WHEELED = PLAYED[: of.VALUE.body_mix]  # what the player turns with the modulation wheel
+WHEELED = PLAYED[: of.VALUE.body_mix]  # ids of parameters that the player itself turns with the modulation wheel
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
 BENDS = {"tension": of.BY_TENSION, "length": of.BY_LENGTH}
 SOURCES = ("model", "truth")
@@ -58,7 +58,11 @@ def wheel_goal(instrument: Instrument) -> float | None:
 
 
 def wheeled(instrument: Instrument, wheel: int, *parts: str) -> Instrument:
-    """The instrument as the modulation wheel, 0 … 127, turns it, where it turns anything of these parts."""
+    """The instrument as the modulation wheel, 0 … 127, turns it; unchanged where the wheel turns none of `parts`.
+
+    Args:
+        parts: beginnings of ids, as "body.".
+    """
     goal = wheel_goal(instrument) if wheel and instrument.mod_wheel.startswith(parts) else None
     if goal is None:
         return instrument
@@ -67,7 +71,7 @@ def wheeled(instrument: Instrument, wheel: int, *parts: str) -> Instrument:
 
 
 def programs_of(preset: Preset, rate_hz: int, sources: Iterable[str], drums: bool) -> tuple[NDArray[np.float64], ...]:
-    """The program of each source as the kernels read it; `drums`: of drums in place of strings."""
+    """The program of each source, in their order, as memory of the kernels; `drums`: of drums instead of strings."""
     model_silence = HEARD_SILENCE
     unheard = 0.0
     silence = HEARD_SILENCE
@@ -86,9 +90,12 @@ def table_of(
     programs: tuple[NDArray[np.float64], ...],
     varied: bool = True,
 ) -> Table:
-    """The table of an instrument, without its number.
+    """The table of an instrument, whose serial and instrument numbers are still 0.
 
     Args:
+        loud: the keys of the instrument, with the body's curves, from which the player computes how loud keys are.
+        grid_points: of the preset.
+        sources, programs: what plays, and for each its program as of `programs_of`.
         varied: whether plucks vary from stroke to stroke, as the instrument says.
     """
     instrument, ear = loud.instrument, loud.ear
@@ -151,7 +158,7 @@ class Tail:
 
     def __init__(self) -> None:
         self.parts: list[NDArray[np.float64]] = []
-        self.slot = slots(TABLE)  # of the next part
+        self.slot = slots(TABLE)  # of the next part: 8-byte numbers from the beginning of the record
 
     def put(self, *parts: NDArray[np.float64]) -> int:
         """The slot of the first of these parts, which are put at the end."""
@@ -162,7 +169,7 @@ class Tail:
 
 
 def _fill_strings(table: np.void, tail: Tail, loud: StringKeys, grid_points: int) -> None:
-    """Fill in strings, their pitches and what a recording adds to them."""
+    """Fill in the table's strings, their pitches and what a recording adds to them; arrays are put in the tail."""
     instrument = loud.instrument
     if loud.recorded is not None:
         put_recorded(table, tail, loud.recorded, grid_points)
@@ -182,7 +189,7 @@ def _fill_strings(table: np.void, tail: Tail, loud: StringKeys, grid_points: int
         table["strings"] = len(strings.strings)
         for number, string in enumerate(strings.strings[::-1]):
             table["open"][number] = string.note, loud.open_hz(string.note), string.string.row
-    turn = 2 * (grid_points - 1)
+    turn = 2 * (grid_points - 1)  # samples in a period of the sine
     table["sines"] = tail.put(np.sin(2 * np.pi * np.arange(turn) / turn))
 
 
@@ -198,7 +205,10 @@ def put_recorded(table: np.void, tail: Tail, string: RecordedString, grid_points
 
 
 def _put_drums(tail: Tail, loud: DrumKeys) -> int:
-    """The slot of the slots of the drums of all keys. A key whose drum is impossible has none."""
+    """Put the drums of all keys in the tail; return the slot of the list (KEYS,) of their slots.
+
+    In the list 0 stands for a key that is silent or whose drum is impossible.
+    """
     blocks: list[NDArray[np.float64]] = []
     places = np.zeros(of.KEYS, np.int64)
     free = tail.slot + of.KEYS

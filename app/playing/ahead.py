@@ -17,14 +17,16 @@ from app.playing.ahead_samples import AheadSamples
 from app.playing.note import PluckVoices
 from app.shared.thread_priority import Rank, lower_priority
 
-SAFE_S = 0.25  # lead of voices that sound, above which one that has not begun goes first
-SCARCE_S = 0.12  # lead of a note that has sounded for so long, below which the oldest makes room
+SAFE_S = 0.25  # a note that sounds with more lead is rendered after one that has not begun
+SCARCE_S = 0.12  # where a note that has sounded for longer has less lead, the oldest makes room
 STOLEN_S = 0.03  # the fade of a note that makes room
 KEPT = 32  # plucks whose samples are kept: those of a player who repeats them need not be rendered again
 
 
 class Ahead:
     """The thread, which starts with the first note; `close` ends it. All may be called from any thread.
+
+    The lead of a note is how far its samples reach beyond what was played of it, in s.
 
     Args:
         begin: hands a note over; called in the thread when enough of all its samples is rendered.
@@ -36,7 +38,8 @@ class Ahead:
     ) -> None:
         self._begin, self._failed = begin, failed
         self._mailbox = threading.Condition()
-        self._notes: list[PluckVoices] = []
+        self._notes: list[PluckVoices] = []  # whose samples are not complete, the oldest first
+        # complete samples (frames, points) by `AheadSamples.key`, the latest last
         self._known: OrderedDict[Hashable, NDArray[np.float32]] = OrderedDict()
         self._closing = False
         self._thread: threading.Thread | None = None
@@ -62,6 +65,7 @@ class Ahead:
             self._thread.join(10)
 
     def _run(self) -> None:
+        """Render blocks, always of the note with the least lead, until `close`; in the thread."""
         lower_priority(Rank.RENDERING)
         while True:
             with self._mailbox:
@@ -78,7 +82,7 @@ class Ahead:
                     self._notes.remove(note)
 
     def _advance(self, note: PluckVoices) -> None:
-        """Render a block of a note's samples, those of which there are fewest; begin the note once it can."""
+        """Render a block of the voice of a note that has the fewest samples; begin the note once it can."""
         if not note.pending and note.seconds > note.from_s + SCARCE_S and _lead_s(note) < SCARCE_S:
             self._make_room()
         if unfinished := note.unfinished:
@@ -97,6 +101,7 @@ class Ahead:
             sounding[0].release(STOLEN_S)
 
     def _keep(self, samples: AheadSamples) -> None:
+        """Keep complete samples for a later note of the same pluck; the oldest beyond KEPT are dropped."""
         with self._mailbox:
             self._known[samples.key] = np.concatenate(samples.blocks)
             while len(self._known) > KEPT:
@@ -104,7 +109,7 @@ class Ahead:
 
 
 def _lead_s(note: PluckVoices) -> float:
-    """The lead of the rendering ahead of playback, in s; the note with the least goes first."""
+    """The lead of a note in s, to compare notes: one that waits or fades out counts as SAFE_S farther ahead."""
     rendered_s = min((samples.rendered_s for samples in note.unfinished), default=0.0)
     if note.released:
         return rendered_s - note.seconds + SAFE_S

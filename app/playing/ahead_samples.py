@@ -24,13 +24,13 @@ class AheadSamples:
     """The samples of a note's voice, rendered ahead.
 
     Args:
-        motion: of which they are; released with the last of them.
+        motion: the model's, which the voice senses at its listening points; released with the last samples.
         key: the values that the samples depend on; they are kept under it.
         from_s: where in its motion the note will begin.
 
     Attributes:
         blocks: of the samples so far, (frames, points) each.
-        given: their number so far.
+        given: frames so far.
         finished: there will be no more.
         ready: enough is rendered for the note to begin.
     """
@@ -88,7 +88,7 @@ class AheadSamples:
         self._finish()
 
     def level(self, seconds: float) -> float:
-        """Root mean square of the first seconds of it."""
+        """Root mean square of the samples of the first `seconds`, of full scale."""
         first = np.concatenate(self.blocks)[: round(seconds * self._rate_hz)]
         return math.sqrt(float(np.square(first, dtype=np.float64).mean()))
 

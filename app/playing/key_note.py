@@ -33,7 +33,7 @@ class KeyNote:
     Attributes:
         player: whose voices it has, in `mixer`.
         id: of its event, which reports carry.
-        path: of the preset.
+        path: the preset's file.
         begin_frame: the frame of the mixer at which it begins; 0: at once.
         instrument: with which it was struck.
         ear: where it was heard then.
@@ -57,16 +57,16 @@ class KeyNote:
     released: bool = False
     cut: bool = False
     timed: bool = False
-    _ended: bool = False
-    _begun: NoteReport | None = None
-    from_s = 0.0
+    _ended: bool = False  # the player has reported its end, or refused it
+    _begun: NoteReport | None = None  # the report of its beginning; None before it
+    from_s = 0.0  # where in its motion it begins, as in `PluckVoices`
 
     def __post_init__(self) -> None:
         self.instrument, self.ear = self.player.instrument, self.player.ear
-        self._playing = Playing(0.0, 0, None)
+        self._playing = Playing(0.0, 0, None)  # how far it was at the latest `look`
 
     def take(self, report: NoteReport) -> None:
-        """Follow a report of the player."""
+        """Take over what the player reports of it: that it began, with string and pluck, or that it ended."""
         if report.kind == of.BEGAN:
             self._begun, self.gain = report, report.gain
             self.string = report.string if report.string >= 0 else None
@@ -81,7 +81,7 @@ class KeyNote:
             self.cut = self.cut or report.kind == of.REFUSED
 
     def look(self) -> None:
-        """Read how far it is. Any thread."""
+        """Read from the player how far it has sounded. Any thread."""
         if self._begun is not None and not self.over:
             self._playing = self.player.compiled.playing(self._begun) or self._playing
 
@@ -155,9 +155,13 @@ class KeyNote:
 
 
 def drop(note: PluckVoices | KeyNote | None, error: Exception, report: Callable[[str, str], None]) -> None:
-    """End a note whose handling failed, as far as it was made.
+    """End a note whose handling failed, and report the error.
 
-    What is wrong with a preset is reported in its own words; any other fault in the same, to be shown once.
+    A ValueError is reported in its own words; any other fault as DROPPED, always the same, to be shown once.
+
+    Args:
+        note: as far as it was made; None: not at all.
+        report: is called with a message and its details.
     """
     if isinstance(error, ValueError):
         report(str(error), "")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from engine.presets import PresetInfo  # and NumPy with it, which settings are read without
 
 PLACES = 10
-ANYWHERE = (0.05, 0.95)  # of a model without trained positions
+ANYWHERE = (0.05, 0.95)  # positions of the lowest and the highest key, for a model without trained ones
 ANY_AMPLITUDE_MM = (0.5, 10.0)
 SOFTEST_MM = 0.05
 LARGEST_VELOCITY = 127
@@ -30,7 +30,7 @@ DIGITS = 4  # after the point, for file names and recipes have them
 _WHITE = (0, 2, 4, 5, 7, 9, 11, 12, 14, 16, 17)
 _BLACK = {1: 1, 2: 3, 4: 6, 5: 8, 6: 10, 8: 13, 9: 15}  # place in the row above -> semitones
 # By native codes of the first key of each row, of X11 (and of Wayland through Qt) and Windows; else by letters.
-_PIANO_CODES = {
+_PIANO_CODES = {  # platform -> native code -> semitones above the C of the key A
     platform: {row + n: s for n, s in enumerate(_WHITE)} | {upper + n: s for n, s in _BLACK.items()}
     for platform, row, upper in (("linux", 38, 24), ("win32", 0x1E, 0x10))
 }
@@ -70,7 +70,7 @@ class PluckRange:
 
     @property
     def row(self) -> tuple[float, ...]:
-        """The positions of the computer's ten keys from A on."""
+        """The pluck positions, in lengths of the string, of the computer's ten keys from A on."""
         return tuple(self.place(number / (PLACES - 1)) for number in range(PLACES))
 
     def turned(self, press: KeyPress, amplitude_mm: float) -> float | None:
@@ -79,7 +79,7 @@ class PluckRange:
         return None if step is None or press.letter.upper() in OCTAVE_STEPS else self.amplitude_of(step[1])
 
     def place(self, share: float) -> float:
-        """The position at 0 … 1 of the keys."""
+        """The pluck position, in lengths of the string, at a share 0 … 1 of the way along the keys."""
         low, high = self.position
         return _round_within(low + min(max(share, 0.0), 1.0) * (high - low), low, high)
 
@@ -103,7 +103,7 @@ class KeyPress:
 
 
 def semitone_of(press: KeyPress, platform: str = sys.platform) -> int | None:
-    """Semitones above the piano's C; None for a key that is not of the piano."""
+    """Semitones above the C that the key A plays; None for a key that is not of the piano."""
     codes = _PIANO_CODES.get(platform)
     if codes and press.code:
         return codes.get(press.code)
@@ -127,7 +127,7 @@ def octave_near(octave: int, keys: Collection[int]) -> int:
 
 
 def octaves_of(low: int, high: int) -> tuple[int, int]:
-    """The octaves, counted as those of the computer's keys, of the MIDI keys `low` and `high`."""
+    """The octaves of the computer's keys, as in `letters_of`, that hold the MIDI keys `low` and `high`."""
     lowest, highest = (min(max((key - LOWEST_C) // 12, LOWEST_OCTAVE), HIGHEST_OCTAVE) for key in (low, high))
     return lowest, highest
 

@@ -62,7 +62,8 @@ class _Wanted:
 class Keys:
     """The keys of an instrument, and its notes. Every public method may be called from any thread.
 
-    A key waits for no knob. A turned instrument is played at once, as loud as through the body before.
+    The instrument that is wanted (the wish) is played by a player in the present mixer. Notes of earlier players ring
+    on in theirs. A key waits for no knob. A turned instrument is played at once, as loud as through the body before.
     Another body is computed in the background. Nothing that takes milliseconds is computed under a lock.
 
     Args:
@@ -95,16 +96,16 @@ class Keys:
         self.recorder = EventRecorder(report)
         self._lock = threading.RLock()
         self.player: InstrumentPlayer | None = None
-        self._in: Mixer | None = None  # where the player's events are played
-        self._playing: list[InstrumentPlayer] = []  # with those before, whose notes may ring
-        self._gains: Mapping[str, float] = AS_THEY_ARE
-        self._compared = True
-        self._notes: dict[tuple[InstrumentPlayer, int], KeyNote] = {}
-        self._wanted: _Wanted | None = None
+        self._in: Mixer | None = None  # the mixer that `player` plays in
+        self._playing: list[InstrumentPlayer] = []  # `player`, and earlier ones whose notes may ring
+        self._gains: Mapping[str, float] = AS_THEY_ARE  # by source
+        self._compared = True  # notes that begin have a voice of each source
+        self._notes: dict[tuple[InstrumentPlayer, int], KeyNote] = {}  # by player and number of the event
+        self._wanted: _Wanted | None = None  # None: no instrument
         self._completed: _Wanted | None = None  # the latest wish for which all is computed, or tried
-        self._path = Path()
-        self._effects: Effects | None = None  # as set
-        self._dry = False
+        self._path = Path()  # the file of the player's preset
+        self._effects: Effects | None = None  # as they were set last
+        self._dry = False  # body and room are left out
         self._switches: dict[tuple[int, int], ControlChange] = {}  # the latest by channel, which players take over
         self._frames, self._moved_s = -1, 0.0  # of the mixer when it was last seen to move, and when that was
         self._reported_body = ""  # the fault of the body that was reported last
@@ -147,6 +148,7 @@ class Keys:
         """Play an event, at once or when it is due; the note of a key that is struck, or None.
 
         Args:
+            due: None: at once.
             struck_s: the device clock's time of the gesture; 0: it is none.
             begun: is called with the note; under the lock, so that notes of a key keep their order.
         """
@@ -174,20 +176,21 @@ class Keys:
             return note
 
     def _release_before(self, event: Event, frame: int) -> None:
-        """Let releases of keys and pedals damp what players before have struck, too. Under the lock."""
+        """Give a release of a key or a pedal to earlier players too, whose notes may still ring. Under the lock."""
         released = isinstance(event, NoteOff) or (isinstance(event, ControlChange) and event.number in RELEASES)
         for player in self._playing if released else []:
             if player is not self.player:
                 player.handle(event, frame)
 
     def _note_switch(self, event: ControlChange) -> None:
+        """Remember the state of one of SWITCHES for later players; a reset forgets those of its channel."""
         if event.number in SWITCHES:
             self._switches[event.number, event.channel] = event
         elif event.number == RESET:
             self._switches = {at: switch for at, switch in self._switches.items() if switch.channel != event.channel}
 
     def look(self) -> list[KeyNote]:
-        """Follow the player's reports; the notes that began since it was asked for the last time. Any thread."""
+        """Take over the players' reports; return the notes that began since the last call. Any thread."""
         begun_notes = []
         with self._lock:  # a note is known before its report is read
             for player in self._playing:
@@ -242,6 +245,7 @@ class Keys:
         ]
 
     def _mixer_stands(self, mixer: Mixer) -> bool:
+        """Return True if the output has taken no frame for STANDS_S."""
         now_s, frames = time.monotonic(), mixer.frames
         if frames != self._frames:
             self._frames, self._moved_s = frames, now_s
@@ -255,7 +259,7 @@ class Keys:
         return None if self._wanted is None else self._wanted.instrument
 
     def begin_recording(self, beat_s: float | None = None) -> None:
-        """Record events from now on, wheels and pedals as they stand; arguments as of `EventRecorder.begin`."""
+        """Record events from now on, after wheels and pedals as they stand; `beat_s`: as of `EventRecorder.begin`."""
         with self._lock:
             player = self.player
             self.recorder.begin([] if player is None else [_turned_event(player), *player.at_hand], beat_s)
@@ -269,7 +273,7 @@ class Keys:
     # In the background
 
     def _set_present_effects(self) -> None:
-        """Body and room of what is played now."""
+        """Set body and room of what is played now, if they have changed; report once a body that cannot be used."""
         instrument = self.heard_through
         effects = None if self._dry or instrument is None else effects_of(instrument)
         if effects != self._effects:
@@ -281,7 +285,7 @@ class Keys:
             self._report(problem, "")
 
     def _present(self) -> InstrumentPlayer | None:
-        """The player in the present mixer; in a new one its strings are at rest. Under the lock."""
+        """The player in the present mixer; where that has changed, a new one with strings at rest. Under the lock."""
         player, mixer = self.player, self._mixer()
         if player is not None and mixer is not self._in:
             self._set_player(player.again(mixer.rate_hz), mixer)
@@ -295,14 +299,14 @@ class Keys:
         self._playing.append(player)
 
     def _follow_wish(self) -> None:
-        """Play what is wanted; what takes milliseconds of it, in the background."""
+        """Play what is wanted: strings at once, nearly as loud as they should be, and all else in the background."""
         wanted, player = self._wanted, self.player
         if wanted is not None and player is not None and not player.of_drums:
             self._load_wanted(player, wanted, nearly=not is_another(wanted.instrument, player.instrument))
         self._in_background(self._complete)
 
     def _complete(self) -> None:
-        """All that keys need to play what is wanted now."""
+        """Compute all that keys need to play what is wanted now, which may take seconds; in the background."""
         wanted, player = self._wanted, self.player
         if wanted is not None and wanted is not self._completed:
             self._completed = wanted
@@ -313,7 +317,11 @@ class Keys:
         self._set_present_effects()
 
     def _load_wanted(self, player: InstrumentPlayer, wanted: _Wanted, nearly: bool = False) -> None:
-        """Let keys play what is wanted, unless something else is by now. `nearly`: as of `keys_of`."""
+        """Let a player play what is wanted, unless something else is by now; report where it cannot.
+
+        Args:
+            nearly: as in `InstrumentPlayer.keys_of`.
+        """
         try:
             keys = player.keys_of(wanted.instrument, wanted.ear, nearly)
             if isinstance(keys, DrumKeys) and not self._compute_drums(keys):
@@ -335,7 +343,10 @@ class Keys:
                     self.recorder.take(_turned_event(player))
 
     def _turn(self, player: InstrumentPlayer, wanted: _Wanted, keys: StringKeys | DrumKeys) -> bool:
-        """Turn the knobs of what is played. False: keys of what is wanted need another table."""
+        """Play the wanted keys by an event for each turned knob.
+
+        Return True if this is done or no longer wanted; False: these keys need another table.
+        """
         with self._lock:
             if wanted is not self._wanted or player is not self.player:
                 return True
@@ -359,7 +370,7 @@ class Keys:
         return True
 
     def _begin(self, wanted: _Wanted) -> None:
-        """Load the preset of what is wanted."""
+        """Load the preset of what is wanted, and let keys play a new player with it; report where that fails."""
         instrument, entry = wanted.instrument, self._find(wanted.instrument.preset)
         if entry is None:
             self._report(f"{instrument.name} is played by the preset {instrument.preset}, which was not found.", "")

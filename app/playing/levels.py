@@ -12,11 +12,11 @@ from app.playing.sources import Sources
 from engine.levels import MATCHED_S, match_gain
 from engine.voices import Mixer
 
-HIGHEST_RATE_HZ = 48_000  # at which they are
+HIGHEST_RATE_HZ = 48_000  # levels are measured at the device's rate, but at no higher one
 
 
 def level_match(sources: Sources, note: PluckVoices, rate_hz: int) -> Mapping[str, float]:
-    """The gain of each source of a note; `rate_hz`: of the device."""
+    """The factors, by source, that bring a note to the level of its truth; `rate_hz`: of the device."""
     seconds = min([MATCHED_S, *(samples.rendered_s for samples in note.ahead)])  # a pluck may be shorter
     rate_hz = min(rate_hz, HIGHEST_RATE_HZ)
     levels = {source: _level(sources, note, source, seconds, rate_hz) for source in note.voices}

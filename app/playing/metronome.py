@@ -13,12 +13,12 @@ from app.player.events import Meter
 from app.playing.playback import AHEAD_S, Beginning
 from engine.voices import Voice, plain_program
 
-CLICKS_AHEAD_S = 1.0  # lead of clicks: so long the window's timer may stand still; another device lacks them
+CLICKS_AHEAD_S = 1.0  # clicks are handed over so early, for the window's timer may stand still as long
 PITCHES_HZ = (1318.5, 1760.0)  # of a beat, of the first in a bar
 DECAY_S = 0.008
 CLICK_S = 0.06
 LEVEL = 0.25  # of full scale
-STOP_S = 0.005
+STOP_S = 0.005  # fade of a click that sounds at the end
 
 
 class Metronome:
@@ -28,11 +28,11 @@ class Metronome:
         self._sound = sound
         self._meter = Meter()
         self._beginning: Beginning | None = None  # of the count-in; None: no click is due
-        self._next = 0  # beat, from the first of the count-in
-        self._voices: list[Voice] = []  # the latest clicks
+        self._next = 0  # number of the next beat to hand over; 0: the first of the count-in
+        self._voices: list[Voice] = []  # clicks that were handed over and are not over
 
     def begin(self, meter: Meter) -> float:
-        """Begin the count-in; return when the first beat after it is, on the clock of `time.monotonic`."""
+        """Begin the count-in; return the time of the first beat after it, in s on the clock of `time.monotonic`."""
         self._meter, self._next = meter, 0
         self._beginning = Beginning(self._sound, AHEAD_S + self._sound.buffer_s)
         self.look()
@@ -55,14 +55,14 @@ class Metronome:
             self._next += 1
 
     def end(self) -> None:
-        """End it, with the clicks that are still to come."""
+        """End the metronome, and cancel the clicks that were already handed over."""
         self._beginning = None
         for voice in self._voices:
             voice.release(STOP_S)
 
 
 def click(rate_hz: int, accented: bool) -> NDArray[np.float32]:
-    """The samples (frames, 1) of a click."""
+    """The samples (frames, 1) of a click; `accented`: of the first beat in a bar."""
     time_s = np.arange(round(CLICK_S * rate_hz)) / rate_hz
     sound = LEVEL * np.sin(2 * np.pi * PITCHES_HZ[accented] * time_s) * np.exp(-time_s / DECAY_S)
     return sound.astype(np.float32)[:, None]

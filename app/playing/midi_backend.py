@@ -13,8 +13,8 @@ from typing import Any
 
 VARIABLE = "LEARNED_STRINGS_MIDI"
 CLIENT = "Learned Strings"
-QUEUE_MESSAGES = 4096
-PERIOD_S = 0.001
+QUEUE_MESSAGES = 4096  # that RtMidi holds until they are fetched
+PERIOD_S = 0.001  # between two looks at its queue
 
 
 class MidiUnavailable(Exception):
@@ -131,6 +131,7 @@ class RtMidiInput:
             return False
 
     def _fetch(self) -> None:
+        """Pass the messages of RtMidi's queue on to the callback, until `close`; in the thread."""
         while self._open:
             time.sleep(PERIOD_S)
             while self._open and (message := self._client.get_message()) is not None:

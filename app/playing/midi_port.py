@@ -14,7 +14,8 @@ class MidiInput:
     """A MIDI input with at most one open port. All is called by one thread.
 
     Args:
-        on_message: is called with what comes, in the input's thread.
+        on_message: is called with the event of each message, in the input's thread.
+        load: loads the system's MIDI, when it is needed first.
         on_release_all: is called with the events that release what came, in the thread of `release_all`,
             `close` or `open`.
     """
@@ -30,9 +31,9 @@ class MidiInput:
         self._load = load
         self._backend: RtMidi | None = None
         self._port: RtMidiInput | None = None
-        self._channels: set[int] = set()  # on which something came
-        self.name = ""  # of the open input
-        self._awaited = ""  # of one that was open, or was to be, and is not connected
+        self._channels: set[int] = set()  # on which events came since the last `release_all`
+        self.name = ""  # of the open input; "": none is
+        self._awaited = ""  # name of the input that `look` opens once it is connected; "": none
 
     def names(self) -> list[str]:
         """The inputs that are connected now.

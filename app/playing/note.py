@@ -50,7 +50,7 @@ class PluckVoices:
     ahead_of_event: bool = False
 
     def subject(self, source: str) -> Subject:
-        """The preset or string whose sound a source is."""
+        """The preset that plays a source: the other one that it names, else the note's own, or a string of it."""
         others = (path for path in self.request.others if source == f"{OTHER}{path.stem}")
         return next(others, self.request.preset)
 
@@ -81,7 +81,7 @@ class PluckVoices:
 
     @property
     def waits_s(self) -> float:
-        """The seconds that it will still be rendered before it sounds; 0: it does not wait, or not known."""
+        """The estimated seconds until enough is rendered for it to begin; 0: it does not wait, or not known."""
         waits = self.pending and not self.over
         return max((samples.waits_s for samples in self.ahead), default=0.0) if waits else 0.0
 
@@ -107,8 +107,8 @@ class PluckVoices:
         """The frame of its mixer at which its motion reaches a time; only once it has begun."""
         assert self.mixer is not None
         rate_hz = self.mixer.rate_hz
-        skipped = (round(self.from_s * rate_hz) + QUANTUM // 2) // QUANTUM * QUANTUM
-        starved_s = min(voice.starved_s for voice in self.voices.values())
+        skipped = (round(self.from_s * rate_hz) + QUANTUM // 2) // QUANTUM * QUANTUM  # frames before it began
+        starved_s = min(voice.starved_s for voice in self.voices.values())  # it waited for samples so long
         return self.began_frame + round((seconds + starved_s) * rate_hz) - skipped
 
     def release_at(self, frame: int) -> None:

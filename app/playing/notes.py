@@ -45,9 +45,9 @@ MOST_NOTES = 40  # that ring at once; the oldest makes room
 STOP_S = 0.012  # the fade of `stop`
 REPLACED_S = 0.02  # the fade of notes that another replaces
 BUSY = 0.75  # load of the device: above it the oldest notes end, so that the others have no gaps
-LOOKS = 10  # at the load, 0.5 s or more, all of which it is above: another program's burst raises it for less
-LEAST_RELIEF = 2  # notes that end then
-MOST_CARRIED = 4  # notes that ring on when the device changes its rate
+LOOKS = 10  # looks at the load in a row that must be above BUSY, 0.5 s or more: bursts of others are shorter
+LEAST_RELIEF = 2  # notes that end at once where the load is above BUSY, at least
+MOST_CARRIED = 4  # notes that ring on, at most, when the device changes its rate
 KEPT_MATCHES = 256
 MOST_MATCHING = 8  # level matches that wait to be computed
 LOOP_AHEAD_S = 0.5  # lead of the next turn of a loop when it is handed to the mixer
@@ -86,16 +86,16 @@ class Notes:
         self._find = find
         self._report = report = faultless(report, "while a note was reported")
         self._lock = threading.RLock()
-        self._notes: list[PluckVoices | KeyNote] = []
+        self._notes: list[PluckVoices | KeyNote] = []  # the oldest first
         self._monitor = Monitor()
-        self._ear: Ear | None = None
+        self._ear: Ear | None = None  # None: not set yet
         self.latest: PluckVoices | KeyNote | None = None
-        self._chosen: NoteSound | None = None
+        self._chosen: NoteSound | None = None  # the pluck that loops and seeks repeat; None: none
         self._reach: PluckRange | None = None  # of a single string, which is played; None: an instrument is
-        self._blind_test = False  # is open
+        self._blind_test = False  # a blind test is open
         self._ahead = Ahead(self._hand_over, self._drop)
-        self._latencies_s: deque[float] = deque(maxlen=100)
-        self._loads: deque[float] = deque(maxlen=LOOKS)
+        self._latencies_s: deque[float] = deque(maxlen=100)  # from gestures to their sound, the latest last
+        self._loads: deque[float] = deque(maxlen=LOOKS)  # share of the device's time, at the latest looks
         self._frames_looked = 0  # of the mixer, when its load was looked at
         self._helper = ThreadPoolExecutor(1, "notes-helper", lower_priority, (Rank.BACKGROUND,))
         self._matches: dict[tuple[object, ...], Mapping[str, float]] = {}  # by `matching_key`
@@ -178,6 +178,7 @@ class Notes:
             return None
 
     def _handle(self, event: Event, due: Due | None) -> PluckVoices | KeyNote | None:
+        """Do what `handle` says; errors are raised."""
         if self._blind_test and isinstance(event, NoteOn | PluckAt):
             return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
         struck_s = self.sound.now_s() if due is None else 0.0  # only gestures are timed
@@ -196,7 +197,7 @@ class Notes:
         return note
 
     def _as_pluck(self, event: Event) -> Event:
-        """The pluck that a key of a single string is; any other event as it is."""
+        """The pluck at a place for a key that is struck while a single string is played; any other event as it is."""
         reach, chosen = self._reach, self._chosen
         if reach is None or not isinstance(event, NoteOn) or event.velocity <= 0:
             return event
@@ -231,7 +232,9 @@ class Notes:
     def turn(
         self, note: PluckVoices | KeyNote, seconds: float, event: NoteOn | PluckAt
     ) -> PluckVoices | KeyNote | None:
-        """Hand the next turn of a loop to the mixer, LOOP_AHEAD_S before `note` is so long; None: it is early.
+        """Begin the next turn of a loop: a note that replaces `note` once that has lasted `seconds`.
+
+        None: nothing is chosen, or that is more than LOOP_AHEAD_S from now, and nothing was done.
 
         Args:
             event: the chosen pluck, as a note of its instrument or of the string alone.
@@ -247,7 +250,7 @@ class Notes:
         return self.keys.handle(event, due, 0.0, self._keep_key_note)
 
     def cancel(self) -> None:
-        """Cancel what was handed over and is not due yet."""
+        """Cancel the events that were handed over and are not due yet."""
         self.keys.cancel()
         with self._lock:
             for note in self._plucks():
@@ -374,7 +377,10 @@ class Notes:
                 self._chosen = replace(chosen_request, preset=request.preset, pluck=request.pluck)
 
     def _chosen_note(self, from_s: float = 0.0, begin_frame: int = 0) -> PluckVoices | None:
-        """A note of the chosen pluck, with voices of what the monitor holds, without presets that are not here."""
+        """A new note of the chosen pluck, which has not begun; None: nothing is chosen.
+
+        Its sources are those of the monitor, without presets that the chosen pluck does not have.
+        """
         if (chosen := self._chosen) is None:
             return None
         available = {*SOURCES, *(f"{OTHER}{path.stem}" for path in chosen.others)}
@@ -399,7 +405,7 @@ class Notes:
                 note.end()
 
     def _keep_key_note(self, note: KeyNote) -> None:
-        """Keep the note of a key, which the player has been given."""
+        """Keep the note of a key, which was handed to the player; the oldest notes make room."""
         with self._lock:
             self._notes.append(note)
             self._make_room(MOST_NOTES)
@@ -480,6 +486,7 @@ class Notes:
         self._do_for_each(ringing[: max(0, len(ringing) - most)], lambda note: note.release(STOLEN_S))
 
     def _apply_monitor(self, note: PluckVoices, at_once: bool = False) -> None:
+        """Fade the voices of a note to the monitor's gains; `at_once`: they begin with these."""
         for source, voice in note.voices.items():
             gain = self._monitor.gain(source, note.voices.keys(), note.match)
             voice.set_gain(gain)
@@ -510,4 +517,5 @@ class Notes:
 
 
 def _enough_for_match(note: PluckVoices) -> bool:
+    """Return True if the first MATCHED_S of all voices are rendered, or all there is of them."""
     return all(samples.finished or samples.rendered_s >= MATCHED_S for samples in note.ahead)

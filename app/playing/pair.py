@@ -13,7 +13,7 @@ STOP_S = 0.012
 
 
 class Pair:
-    """Two sounds that play on together, of which one is heard. For one thread.
+    """Two sounds that loop together, of which one is heard. For one thread.
 
     Args:
         samples: name -> (frames, channels) at the mixer's rate, all of one length.
@@ -21,8 +21,8 @@ class Pair:
 
     def __init__(self, mixer: Mixer, samples: Mapping[str, NDArray[np.float32]]) -> None:
         self.mixer, self._samples = mixer, samples
-        self._voices: dict[str, Voice] = {}
-        self._heard = ""
+        self._voices: dict[str, Voice] = {}  # by name; empty: nothing sounds
+        self._heard = ""  # name of the one that is heard; "": none
 
     def select(self, name: str) -> None:
         """Set which one is heard; where they sound, it is a cross-fade."""
@@ -44,7 +44,7 @@ class Pair:
         self.mixer.add(*self._voices.values())
 
     def stop(self) -> None:
-        """Fade out."""
+        """Fade both out."""
         for voice in self._voices.values():
             voice.release(STOP_S)
         self._voices = {}

@@ -13,7 +13,7 @@ from engine.voices import Mixer
 
 AHEAD_S = 0.05  # lead of a handed-over event, besides the device's buffer: so late the thread may be
 LOOK_S = 0.05  # between two looks at the mixer, at most: it may be another
-JOIN_S = 2.0
+JOIN_S = 2.0  # for the end of the thread, at most
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,7 @@ class Playback:
             thread.join(JOIN_S)
 
     def _run(self, events: Sequence[TimedEvent], stopping: threading.Event) -> None:
+        """Hand over each event ahead of its time; release keys and wheels after the last one, or when stopped."""
         beginning, due = Beginning(self._sound, self._ahead_s), None
         nobody_plays = release_all(channels_in(timed_event.event for timed_event in events))
         for timed_event in events:
@@ -108,8 +109,8 @@ class Beginning:
 
     def __init__(self, sound: Sound, ahead_s: float) -> None:
         self._sound, self._mixer = sound, sound.mixer
-        self._frame = self._mixer.frames + round(ahead_s * self._mixer.rate_hz)
-        self._began_s = time.monotonic() + ahead_s
+        self._frame = self._mixer.frames + round(ahead_s * self._mixer.rate_hz)  # of `_mixer`, at time 0 of the list
+        self._began_s = time.monotonic() + ahead_s  # the same, on the clock of `time.monotonic`
 
     def due(self, time_s: float) -> Due:
         """The time when an event is due, `time_s` after the beginning."""

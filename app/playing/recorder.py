@@ -27,10 +27,10 @@ class EventRecorder:
     def __init__(self, report: Callable[[str, str], None]) -> None:
         self._report = report
         self._lock = threading.Lock()
-        self._recorded: list[TimedEvent] | None = None
-        self._unfetched: list[TimedEvent] = []
-        self._began_s = self.ended_s = 0.0
-        self._reported_full = self._counted = False
+        self._recorded: list[TimedEvent] | None = None  # None: nothing is being recorded
+        self._unfetched: list[TimedEvent] = []  # those that `fetch` has not returned yet
+        self._began_s = self.ended_s = 0.0  # by `time.monotonic`, and after that
+        self._reported_full = self._counted = False  # counted: times are from the first beat
 
     @property
     def recording(self) -> bool:
@@ -65,7 +65,7 @@ class EventRecorder:
             self._report(FULL, "")
 
     def cancel(self, event: Event | None = None) -> None:
-        """Forget events whose time is still to come, or this one of them."""
+        """Forget the events whose time is still to come; with `event`, only those equal to it."""
         with self._lock:
             if self._recorded is not None:
                 played_s = time.monotonic() - self._began_s
@@ -77,7 +77,7 @@ class EventRecorder:
                     ]
 
     def end(self) -> list[TimedEvent]:
-        """End the recording; return events as `played_from` has them. Those not fetched yet can be, up to here."""
+        """End the recording; return its events as `played_from` has them. `fetch` still returns those up to now."""
         with self._lock:
             recorded, self._recorded = self._recorded or [], None
             self.ended_s = max(0.0, time.monotonic() - self._began_s)

@@ -43,6 +43,7 @@ class Sources:
             return loaded
 
     def _read(self, subject: Subject) -> Preset:
+        """The preset from its file, or with another string from the loaded preset. Raises PresetError."""
         if not isinstance(subject, StringOf):
             return load_preset(subject)
         return of_string(self.load(subject.path).preset, subject.string)
@@ -54,7 +55,7 @@ class Sources:
             loaded.program(source, rate_hz)
 
     def _known(self, subject: Subject) -> Loaded | None:
-        """The loaded preset, marked as used last; None: not loaded."""
+        """The preset in memory, which becomes the latest used; None: not loaded."""
         with self._lock:
             loaded = self._presets.get(subject)
             if loaded is not None:

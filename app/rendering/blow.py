@@ -30,7 +30,7 @@ GRID = 57  # points of a picture along the longer side; odd: one is the centre
 MOST_HEADS = 24  # that are kept, of 2 MB at most
 RATE_HZ = 48_000
 FRAMES_OF_FLASH = RATE_HZ // FLASH_HZ
-TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its angle follows from them
+TURNS = 4  # angles computed in a turn of the fastest mode that is shown, at least: they must not skip a turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Head:
 
     @classmethod
     def of(cls, surface: Surface, sides: tuple[float, float]) -> Head:
-        """The head on a grid; `sides`: length and width, for the numbers of columns and rows."""
+        """The head on a grid; `sides`: length and width in any unit, which give the numbers of columns and rows."""
         inside, places = grid_of(surface, sides)
         shapes = surface.picked(np.arange(min(len(surface.wavenumber), MOST_SHOWN))).shapes(places)
         return cls(inside, shapes.astype(np.float32), places)
@@ -103,7 +103,7 @@ class ModalMotion:
         self.size_m = np.zeros((self.flashes, len(omega)))
         self.angle = np.zeros((self.flashes, len(omega)))
         self.block_m = np.zeros((0, len(omega)))
-        self._turn = omega / RATE_HZ
+        self._turn = omega / RATE_HZ  # radians in a frame, (modes,)
         most = max(1.0, math.tau / TURNS / float(self._turn[-1]))
         steps = [step for step in range(1, FRAMES_OF_FLASH + 1) if FRAMES_OF_FLASH % step == 0 and step <= most]
         self._step = steps[-1]  # frames from one whose angle is computed to the next
@@ -112,11 +112,12 @@ class ModalMotion:
         self._wrapped = self._angle = np.zeros(len(omega))  # the last angle, within a turn and as it has grown
 
     def append(self, block_m: Array) -> None:
-        """The next frames, (frames, all modes)."""
-        q = block_m[:, : len(self._turn)]
+        """Append the next frames, (frames, all modes) in m; the last one gets its angle with the next call."""
+        q = block_m[:, : len(self._turn)]  # of the modes that are shown
         before_m = self._last if len(self._last) == 2 else np.concatenate([-q[:1], self._last])  # odd about the blow
         q = np.concatenate([before_m, q])
         first, stop = self._known, self._known + len(q) - 2
+        # frames whose angles are computed
         numbers = np.arange(-(-first // self._step) * self._step, stop, self._step)
         indices = numbers - first + 1
         swing = (q[indices + 1] - q[indices - 1]) / (2 * np.sin(self._turn))  # v/ω
@@ -125,7 +126,7 @@ class ModalMotion:
             before = angle[0] if first == 0 else self._wrapped
             steps = (np.diff(np.concatenate([before[None], angle]), axis=0) + math.pi) % math.tau - math.pi
             angles = (before if first == 0 else self._angle) + np.cumsum(steps, axis=0)
-            self._wrapped, self._angle = angle[-1], angles[-1]
+            self._wrapped, self._angle = angle[-1], angles[-1]  # (modes,)
             flash = numbers % FRAMES_OF_FLASH == 0
             count = min(int(flash.sum()), self.flashes - self.ready)  # those after the last are left out
             flashes = slice(self.ready, self.ready + count)
@@ -170,6 +171,7 @@ class BlowTake(Sounding):
         self._measured = 1  # frames; the first is no prediction
 
     def measure(self) -> None:
+        """Add the errors of the latest block, which is all that is new of model and truth."""
         if self.ready_frames > self._measured:
             model, truth = (self.motions[name].block_m for name in SOURCES)
             self.error_course.add(model, truth, self.modes.scale**2)
@@ -186,7 +188,9 @@ class BlowTake(Sounding):
         return self.modes.scale[: len(self.head.shapes)]
 
     def modal_m(self, source: str, position_s: float, speed: float) -> Array | None:
-        """Amplitudes (modes,) of `head`'s shapes as slow motion shows them at a time; None: not rendered yet.
+        """Amplitudes (modes,) in m of `head`'s shapes as slow motion shows them at a time; None: not rendered yet.
+
+        `speed` is a share of real time; from 1 on nothing is slowed.
 
         "difference" is that of the true motions, turned as slowly as the truth is.
         """

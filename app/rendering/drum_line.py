@@ -50,13 +50,13 @@ class DrumLine:
     """The rendering of a source into its motion and its signal, with the methods of `SourceLine`.
 
     Args:
-        begin: starts the source; its first frame is the one after the blow.
-        motion: filled with the modes.
+        begin: starts the source at the blow; what it returns gives the next frames, from the one after the blow on.
+        motion: is filled with the modes.
     """
 
     rate_hz = RATE_HZ
-    behind = False
-    ends_s: float | None = None
+    behind = False  # it has no flashes to catch up with
+    ends_s: float | None = None  # it never runs away
 
     def __init__(self, take: BlowTake, begin: Callable[[], Blocks], motion: ModalMotion) -> None:
         self.motion = motion
@@ -89,10 +89,10 @@ class DrumLine:
         return self._signal
 
     def advance(self, samples: int) -> None:
-        """Render the next frames of the motion, and a block of the signal."""
+        """Render the next frames, `samples` of them, of the motion, and a block of the signal."""
         together = self._signal_blocks is self._motion_blocks
         left = self._signal.frames - self._signal.ready_frames
-        heard_m = np.zeros((0, len(self._weights)))
+        heard_m = np.zeros((0, len(self._weights)))  # new frames of the signal, (frames, modes)
         if samples:
             self.motion.append(block_m := self._motion_blocks(samples).numpy())
             heard_m = block_m[:left] if together else heard_m

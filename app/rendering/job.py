@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 class RenderJob:
     """The rendering of a request; `advance` does the next block of it, and calls `say` in its thread.
 
+    A line renders one source: "model", "truth", or the model of another preset that is drawn beside them.
     Requests for one motion differ in listening points, slow motion or other presets.
 
     Args:
@@ -50,10 +51,10 @@ class RenderJob:
         self._load = load
         self._say = say
         self._helper = helper
-        self._lines: dict[str, SourceLine | DrumLine] = {}
-        self._strobe: Strobe | None = None
+        self._lines: dict[str, SourceLine | DrumLine] = {}  # by source
+        self._strobe: Strobe | None = None  # slow motion that the lines render; None before the first
         self._coming: Listened | None = None  # signals at other listening points, until they are complete
-        self._finished = False  # whether the listener has been called for it
+        self._finished = False  # "finished" has been reported
         self._begun_s = time.monotonic()
 
     def ask_again(self, request: NoteSound) -> None:
@@ -112,6 +113,7 @@ class RenderJob:
             self._say("finished", take)
 
     def _begin(self) -> Take | BlowTake:
+        """Begin the take of the request, and the lines of model and truth. Raises as `advance`."""
         request = self.request
         take: Take | BlowTake
         lines: Mapping[str, SourceLine | DrumLine]
@@ -167,18 +169,23 @@ class RenderJob:
                 take.listened = self._listened(ear)
 
     def _listened(self, ear: Ear) -> Listened:
+        """New signals of all lines at these listening points, empty so far."""
         return Listened(ear, {name: line.listen(ear) for name, line in self._lines.items()})
 
     def _is_whole(self, listened: Listened) -> bool:
+        """Return True if these signals are complete, those of other presets too."""
         return all(listened.signals[name].complete for name in self._source_names() if name in listened.signals)
 
     def _wanted_strobe(self, take: Take | BlowTake) -> Strobe:
         return Strobe(self.request.speed, take.fundamental_hz, take.seconds)
 
     def _advance_lines(self, take: Take | BlowTake) -> None:
-        """Render a block of the model here, of the truth in the helper, and there others up to its end."""
+        """Render a block of the model here, and in the helper the same of the truth, and the others up to its end.
+
+        Blocks begin short and double. Others that are behind take several calls to catch up.
+        """
         model, truth = (self._lines[name] for name in SOURCES)
-        first = truth.done
+        first = truth.done  # samples so far
         frames = min(max(truth.first_frames, min(2 * first, truth.block_frames)), truth.frames - first)
         end_s = (first + frames) / truth.rate_hz if first + frames < truth.frames else take.seconds + 1.0
         others = [self._lines[name] for name in self._source_names()[len(SOURCES) :]]
@@ -190,10 +197,12 @@ class RenderJob:
         take.model_ends_s = model.ends_s
 
     def _source_names(self) -> list[str]:
+        """The sources of the latest request, model and truth first."""
         return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
 
 
 def _begin_pluck(request: NoteSound, loaded: Loaded) -> tuple[Take, dict[str, SourceLine]]:
+    """A take of a pluck, and the lines of model and truth by source."""
     info, name = loaded.preset.info, loaded.preset.name
     take = Take(name, info, request.pluck, request.seconds, request.ear, loaded.stride, model=loaded.model)
     lines = {name: SourceLine(take, name, loaded) for name in SOURCES}

@@ -21,9 +21,11 @@ BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next
 class SourceLine:
     """The rendering of a source into its motion and its signal.
 
+    Pictures are every `stride`-th sample. Flashes are the moments that slow motion shows, as a strobe does.
+
     Args:
         name: of the source.
-        loaded: its preset; None for a string at rest.
+        loaded: its preset; None: a string at rest, in place of a model that cannot be rendered.
 
     Attributes:
         motion: the pictures.
@@ -43,13 +45,14 @@ class SourceLine:
         self._loaded = loaded
         self._source = None if loaded is None else loaded.source(name)
         points = take.info.grid_points
+        # the string at its release, (1, grid points) in m
         self._initial = np.zeros((1, points)) if loaded is None else loaded.initial_m(take.pluck)[None]
         self.motion = Pictures(self.rate_hz / self.stride, self._initial.shape[1], take.seconds)
         self._pictures: _Frames | _EveryFrame = _Frames(self._source, self._initial)
         if loaded is not None and name != "truth" and loaded.steps:
             self.motion = loaded.motion(take.pluck, take.seconds)
             self._pictures = _EveryFrame(self.motion)
-        self._flashes: Flashes | None = None
+        self._flashes: Flashes | None = None  # the latest that were requested
         self._shown: _Frames | None = None  # renders flashes that were requested after the pictures
         self._listening: Listening | None = None  # until its signal is complete
 
@@ -68,7 +71,10 @@ class SourceLine:
 
     @property
     def ends_s(self) -> float | None:
-        """The time of the last valid frame where the source ran away, and is at rest since. None: it did not."""
+        """The time of the last valid frame before the output grew without bound: the string is at rest since.
+
+        None: it did not.
+        """
         ends = self._pictures.ends
         return None if ends is None else ends / self.rate_hz
 
@@ -101,6 +107,7 @@ class SourceLine:
         flashes = self._flashes
         if samples:
             numbers = np.arange(-(-first // self.stride) * self.stride, stop, self.stride)
+            # the frames of pictures, and of flashes that are rendered along with them
             union, joint = numbers, flashes is not None and self._shown is None
             if flashes is not None and joint:
                 union = np.union1d(numbers, flashes.needed(first, stop))
@@ -117,6 +124,7 @@ class SourceLine:
                 self._listening = None
 
     def _catch_up(self, frames: _Frames, flashes: Flashes, most: int) -> None:
+        """Render flashes that are behind over the next `most` samples; they are shown once they have caught up."""
         stop = min(frames.done + most, self.done)
         numbers = flashes.needed(frames.done, stop)
         flashes.take(stop, numbers, frames.take(numbers, stop))
@@ -159,11 +167,11 @@ class _Frames:
     def take(self, numbers: NDArray[np.int64], stop: int) -> NDArray[np.float32]:
         """Frames of these ascending numbers in `done` … stop - 1, (frames, grid_points) in m; passes up to `stop`."""
         out = np.zeros((len(numbers), self._initial.shape[1]), np.float32)
-        following = int(len(numbers) > 0 and numbers[0] == 0)
+        following = int(len(numbers) > 0 and numbers[0] == 0)  # 1: the first is the release itself
         out[:following] = self._initial
         if self._state is not None and len(numbers) > following:
             assert self._source is not None
-            ahead = numbers[following:] - self._state.frame
+            ahead = numbers[following:] - self._state.frame  # frames from the present state
             try:
                 frames, self._state = self._source.sample(self._state, ahead, stop - 1 - self._state.frame)
                 out[following:] = frames[0]

@@ -19,7 +19,7 @@ BEYOND = 2 * REACH + 2 * QUANTUM  # samples after the end, which the differentia
 
 
 class Listening:
-    """A reader of the voice of a source into `signal`.
+    """A reader of the voice of a source, which appends to `signal`.
 
     Args:
         voice: at the rate of the signal, with room for BEYOND frames more.
@@ -31,7 +31,7 @@ class Listening:
         voice.begin_at_once()
         self._offline = OfflineVoice(voice)
         self._motion = motion if voice.program.rendered and isinstance(motion, ModelMotion) else None
-        self._given = 0  # samples of the motion
+        self._given = 0  # samples of the motion that the voice has
 
     def advance(self, stop: int) -> None:
         """Append to the signal up to a frame, or less where less is there; silence where the source runs away."""

@@ -30,7 +30,7 @@ class ModelMotion(Pictures):
         super().__init__(source.rate_hz, source.grid_points, seconds)
         self._model = ModelFrames(source, initial_m)
         self._lock = threading.Lock()
-        self._spent_s = 0.0
+        self._spent_s = 0.0  # on rendering, without the first block
         self.ends: int | None = None
         self.speed = 0.0
 
@@ -43,6 +43,7 @@ class ModelMotion(Pictures):
                     self._render_block()
 
     def _render_block(self) -> None:
+        """Append the next block, and measure the speed; zeros up to the end where the model runs away."""
         began_s, left = time.monotonic(), self.frames - self.ready_frames
         try:
             self.append(self._model.advance(left))
@@ -58,10 +59,10 @@ class ModelMotion(Pictures):
 def give(voice: Voice, motion: ModelMotion, given: int) -> NDArray[np.float32]:
     """Give a voice the samples of a motion that are ready, and return them, (frames, points).
 
-    A point reflection about the last frame continues them.
+    Beyond the last frame the motion is continued by its point reflection.
 
     Args:
-        given: their number before.
+        given: how many samples the voice has so far.
     """
     last = motion.frames - 1
     frames = motion.read(given, given + voice.room)

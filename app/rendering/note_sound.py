@@ -38,8 +38,10 @@ class Struck:
 class NoteSound:
     """A pluck and where it is heard, or a key of an instrument.
 
+    Places on the string (pluck, width, listening points) are shares of its length, 0 … 1.
+
     Attributes:
-        preset: the file, with another string for one of many.
+        preset: the preset's file; for a model of many strings it can hold the plucked string too (`StringOf`).
         seconds: the duration; of a file that ends by its decay the longest.
         ear: listening points, pick-up and soloed mode; files and listening tests have all modes.
         speed: of the picture's slow motion; 1 is real time.
@@ -69,12 +71,16 @@ class NoteSound:
 
     @property
     def _motion(self) -> tuple[object, ...]:
+        """The values that the motion of model and truth depends on."""
         if self.struck is not None:
             return path_of(self.preset), self.struck, self.seconds
         return self.preset, self.pluck, self.seconds
 
     def load(self, rate_hz: int | None = None) -> Preset:
-        """Load the preset, of many strings at a rate where the sound gives none; None: its own.
+        """Load the preset, with its string.
+
+        Args:
+            rate_hz: of a preset of many strings, where the sound gives none; None: the preset's own.
 
         Raises:
             PresetError: it cannot be used.
@@ -82,11 +88,14 @@ class NoteSound:
         return load_subject(self.preset, rate_hz) if self.struck is None else load_preset(path_of(self.preset))
 
     def words(self, title: str) -> str:
-        """The description for people; `title`: of the preset."""
+        """The description for people; `title`: of the preset.
+
+        Places are shares of the string's length. The string's pitch is named only where `preset` holds a string.
+        """
         remark = f". All modes, although mode {self.ear.solo} is soloed" if self.ear.solo else ""
         if self.struck is not None:
             return f"{self.struck.words}{remark}"
-        pluck, points, string = self.pluck, self.ear.points, string_of(self.preset)
+        pluck, points, string = self.pluck, self.ear.points, string_of(self.preset)  # None: `preset` is a file alone
         width = "" if pluck.shape == "triangular" else f" {pluck.width:.3f} wide"
         string_words = f", a string of {string.undamped_frequency(1) / math.tau:.1f} Hz" if string else ""
         pluck_words = f"{shape_word(pluck.shape)}{width}, at {pluck.position:.2f}, {pluck.amplitude_mm:.3g} mm"

@@ -58,10 +58,10 @@ class Flashes:
         before = np.minimum(places.astype(np.int64), max(frames - 2, 0))
         after = np.minimum(before + 1, frames - 1)
         share = places - before
-        self._parts = [(before, 1 - share), (after, share)]
-        self._needed = np.unique(np.concatenate([before, after]))
-        self._last = after
-        self._shapes_m = np.zeros((len(places), grid_points), np.float32)
+        self._parts = [(before, 1 - share), (after, share)]  # by flash: the two frames around it, and their weights
+        self._needed = np.unique(np.concatenate([before, after]))  # frames, ascending
+        self._last = after  # the last frame that each flash needs, (flashes,)
+        self._shapes_m = np.zeros((len(places), grid_points), np.float32)  # (flashes, grid points)
         self.ready = 0
 
     def needed(self, first: int, stop: int) -> NDArray[np.int64]:
@@ -69,7 +69,7 @@ class Flashes:
         return self._needed[np.searchsorted(self._needed, first) : np.searchsorted(self._needed, stop)]
 
     def take(self, stop: int, numbers: NDArray[np.int64], frames_m: NDArray[np.float32]) -> None:
-        """Add frames with these ascending numbers, (frames, grid_points).
+        """Add frames with these ascending numbers, (frames, grid_points) in m.
 
         All frames needed before `stop` must be among these or have been added before.
         """

@@ -25,7 +25,13 @@ KEPT_MOTIONS = 2  # of a preset, the latest: 19 MB each for 3 s at 16 kHz
 
 @dataclass(frozen=True)
 class StringOf:
-    """A preset of many strings, played as this one; rate and modes as of `of_string`."""
+    """A preset of many strings, played as this one.
+
+    Attributes:
+        path: the preset's file.
+        rate_hz: None: the preset's own.
+        modes: their number; None: all below 20 kHz and half the rate, as many as the grid holds.
+    """
 
     path: Path
     string: StringParameters
@@ -37,7 +43,10 @@ Subject = Path | StringOf
 
 
 def load_subject(subject: Subject, rate_hz: int | None = None) -> Preset:
-    """Load and check the preset, of many strings at a rate where the subject gives none; None: its own.
+    """Load and check the preset of a subject, with its string.
+
+    Args:
+        rate_hz: of a preset of many strings, where the subject gives none; None: the preset's own.
 
     Raises:
         PresetError: the file cannot be used, or it is not of many strings, or this string is not possible.
@@ -54,7 +63,7 @@ def path_of(subject: Subject) -> Path:
 
 
 def string_of(subject: Subject) -> StringParameters | None:
-    """The string that is given; None: the preset's own."""
+    """The string that a subject gives; None: it is a file alone, and the string is the preset's own."""
     return subject.string if isinstance(subject, StringOf) else None
 
 
@@ -119,6 +128,6 @@ class Loaded:
     def voice(
         self, source: str, pluck: Pluck, ear: Ear, rate_hz: int, seconds: float = 0.0, gain: float = 1.0
     ) -> Voice:
-        """The voice of a pluck; `seconds`: how many there will be of samples that are rendered."""
+        """The voice of a pluck at a rate; `seconds`: the length of its samples, without a compiled voice."""
         program = self.program(source, rate_hz)
         return Voice(program, self.initial_m(pluck), ear, gain, seconds, self.preset.info.rate_hz)

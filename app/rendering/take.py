@@ -40,6 +40,7 @@ class FrameSeries:
 
     Attributes:
         rate_hz: frames per second; the first is at the release.
+        places: values in a frame: grid points, or listening points.
         frames: when complete.
         ready_frames: so far.
     """
@@ -55,6 +56,7 @@ class FrameSeries:
         return self.ready_frames == self.frames
 
     def append(self, values: NDArray[np.float32]) -> None:
+        """Append frames, (frames, places)."""
         start, stop = self.ready_frames, self.ready_frames + len(values)
         self._values[start:stop] = values
         self.ready_frames = stop
@@ -66,7 +68,7 @@ class FrameSeries:
 
 
 class Signal(FrameSeries):
-    """The signal of a source at the listening points, in m or m/s, at the source's own rate."""
+    """The signal of a source at the listening points, in the unit of the pick-up, at the source's own rate."""
 
     rate_hz: int
 
@@ -151,7 +153,7 @@ class Sounding(ABC):
 
     @property
     def pickup(self) -> str:
-        """The kind of pick-up, which signals are in the unit of."""
+        """The kind of pick-up, which gives the unit of the signals."""
         return self.listened.ear.pickup
 
     @property
@@ -226,6 +228,7 @@ class Take(Sounding):
         return *super().progress, *(motion.ready_frames for motion in motions), *flashes
 
     def measure(self) -> None:
+        """Add the errors of the pictures that both model and truth have since the last call."""
         first, stop = self._measured, self.ready_frames
         if stop > first:
             model, truth = (self.motions[name].read(first, stop) for name in SOURCES)

@@ -19,10 +19,10 @@ from app.shared.worker import Job, Worker
 from engine.presets import PresetError
 
 TIDY_AFTER_S = 1.0  # without anything to render, until free memory is given back
-IN_STEP_S = 0.5  # for how long after its pluck a motion may be held in step with its sound
+IN_STEP_S = 0.5  # after its pluck, for which a motion may be held in step with its sound
 LEAD_S = 0.08  # how far ahead of the sound it is rendered meanwhile
-LOOK_AGAIN_S = 0.01
-PATIENCE_S = 5.0  # for the first sound
+LOOK_AGAIN_S = 0.01  # between two looks while it waits
+PATIENCE_S = 5.0  # for which the first motion waits, at most, until a pluck would sound
 
 
 class RenderWorker:
@@ -65,11 +65,13 @@ class RenderWorker:
     # All below runs in the worker's thread.
 
     def _hear(self, _: Job, signal_name: str, *values: str) -> None:
+        """Report the failure of a rendering, and forget it."""
         if signal_name == "failed":
             self._rendering = None
             self._say(signal_name, *values)
 
     def _render(self, request: NoteSound, job: Job) -> None:
+        """Render a request block by block until nothing is left to do; `job.wait` raises where a newer one waits."""
         while not self._sounds() and time.monotonic() < self._patient_until_s:
             job.wait(LOOK_AGAIN_S)
         rendering = self._rendering

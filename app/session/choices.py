@@ -137,7 +137,7 @@ class Choices(Monitor):
             changes["pluck"] = asdict(changes.get("pluck", self.pluck)) | plucked
         if unknown := changes.keys() - Choices.model_fields.keys():
             raise ValueError(f"unknown field {bounds.brief(unknown.pop())}")
-        try:  # `a`, `b` and `single` tell them from old choices
+        try:  # with `a`, `b` and `single` they are not taken for choices of earlier versions
             checked = Choices.model_validate({"a": self.a, "b": self.b, "single": self.single, **changes})
         except ValidationError as error:
             raise ValueError(explained(error)) from error
@@ -149,7 +149,7 @@ class Choices(Monitor):
         return choices._turned(turns) if turns else choices
 
     def _turned(self, turns: Mapping[str, Any]) -> Choices:
-        """The choices with TURNED of the pick-up of what is played. Raise ValueError as `changed`."""
+        """The choices with new values, by name of TURNED, in the pick-up of what is played. Raises ValueError."""
         pickup, right = turned_pickup(self.pickup, turns, self.listen_right), self.right
         if {"listen_right", "stereo"} & turns.keys():
             right = turns.get("listen_right", self.listen_right)

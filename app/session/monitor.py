@@ -21,6 +21,7 @@ class Monitor(Value):
 
     Attributes:
         a, b: their sources: "model", "truth", "difference" (model minus truth) or "preset:NAME".
+        heard: the slot that is heard.
         difference: whether the difference is heard in place of the slot, until the key for it is pressed again.
         level_match: whether each source is brought to the level of the truth, once its gain is known.
     """
@@ -54,8 +55,8 @@ class Monitor(Value):
         """The factor of a source's voice; 0: it is not heard.
 
         Args:
-            sources: those of the note; where the heard one is missing, or a part of the difference, that of the slot
-                is heard, else the model.
+            sources: those that the note has voices of. Where the source to be heard, or a part of the difference, is
+                missing, the slot's own is heard; where that is missing too, the model.
             match: by source, the factor that brings it to the level of the truth; None: not known yet.
         """
         if self.source_heard == DIFFERENCE and {"model", "truth"} <= set(sources):

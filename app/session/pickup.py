@@ -9,8 +9,8 @@ from app.instruments.instrument import Instrument, Pickup
 from app.shared.parameters import OF_CHOICES
 from engine import bounds
 
-POINTS = ("listen", "listen_right")
-TURNED = (*POINTS, "stereo", "pickup_kind")
+POINTS = ("listen", "listen_right")  # listening points: in stereo left and right
+TURNED = (*POINTS, "stereo", "pickup_kind")  # names of what is turned on a pick-up
 RIGHT_POINT = "pickup.points.1"  # of an instrument in stereo
 
 

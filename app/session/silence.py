@@ -59,6 +59,7 @@ def why_difference_silent(choices: Choices, take: Take) -> str:
 
 
 def _why_points_silent(choices: Choices) -> str:
+    """The reason why a listening point is silent: it lies at a fixed end, or on a node of the soloed mode."""
     ear = choices.ear
     silent_points = [point for point in ear.points if ear.is_on_node(point)]
     if not silent_points:
@@ -72,6 +73,7 @@ def _why_points_silent(choices: Choices) -> str:
 
 
 def _why_solo_silent(choices: Choices, library: Library) -> str:
+    """The reason why a soloed mode is silent: the string lacks it, or the pluck does not excite it."""
     entry = library.find(other_preset(choices.source_heard) or choices.preset)
     if choices.solo == 0 or entry is None:
         return ""

@@ -30,7 +30,7 @@ def source_title(source: str, library: Library) -> str:
 
 
 def info_of(choices: Choices, entry: PresetEntry) -> PresetInfo:
-    """The preset's info for the string that is plucked; for its own where it cannot play that one."""
+    """The preset's info for the string that is plucked, or for its own string where it cannot play that one."""
     if choices.string is not None and entry.info.family is not None:
         with contextlib.suppress(ValueError):
             return info_of_string(entry.info, choices.string)

@@ -26,4 +26,5 @@ def brought_pluck(choices: Choices, library: Library, name: str) -> Mapping[str,
 
 
 def _training(info: PresetInfo) -> tuple[object, ...]:
+    """A value that is equal for presets of the same training."""
     return info.string, info.tension_modulated, info.initial, info.trained_range

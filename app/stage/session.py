@@ -20,9 +20,9 @@ from app.shared.parameters import OF_CHOICES
 from app.stage.stage import Chosen, Event, changed_names, first_stage, next_stage
 from app.stage.step_words import step_words, turned_fields
 
-# Not what belongs to looking and listening alone: views, speed, volume, loop, model or truth.
+# Fields that undo restores: not those of looking and listening alone (views, speed, volume, loop, model or truth).
 RECORDED = frozenset({"instrument", "single", "seconds", "string_pickup", "right", "string", *PLUCK})
-GATHER_S = 0.5
+GATHER_S = 0.5  # changes of the same fields within it are one step
 LARGEST_STEPS = 200
 
 
@@ -47,7 +47,7 @@ class Session:
         now_s: a clock, replaced in tests.
         held: whether a gesture that has begun may still be under way. Its `release` may never come, as where a dialog
             or another window takes the mouse.
-        brought: the further fields that change with a preset, by its name.
+        brought: returns the further fields that change when the preset of a name is chosen, with their values.
     """
 
     changed = Signal(frozenset)
@@ -61,11 +61,11 @@ class Session:
     ) -> None:
         self.stage = first_stage(choices or Choices())
         self._now_s, self._still_held, self._brought = now_s, held, brought
-        self._undo: deque[Step] = deque(maxlen=LARGEST_STEPS)
-        self._redo: deque[Step] = deque()
-        self._held = False
-        self._turned: frozenset[str] | None = None  # by the step that still gathers; None: the next is a new one
-        self._turned_s = 0.0
+        self._undo: deque[Step] = deque(maxlen=LARGEST_STEPS)  # the latest last
+        self._redo: deque[Step] = deque()  # undone steps, reversed, the latest undone last
+        self._held = False  # between `hold` and `release`
+        self._turned: frozenset[str] | None = None  # fields of the step that still grows; None: the next is a new one
+        self._turned_s = 0.0  # when it last grew, by `now_s`
 
     @property
     def choices(self) -> Choices:
@@ -152,6 +152,7 @@ class Session:
         return next((step for step in reversed(steps) if _values(present, step.before) != step.before), None)
 
     def _restore(self, source: deque[Step], target: deque[Step]) -> None:
+        """Take back the last step of `source` that changes something, and put its reverse on `target`."""
         self.release()
         step = self._next(source)
         while source and source.pop() is not step:
@@ -161,7 +162,11 @@ class Session:
             target.append(Step(step.after, step.before))
 
     def _record(self, before: Choices, fields: frozenset[str]) -> None:
-        """Record that the user has changed fields."""
+        """Record a step of undo: fields that the user has changed, which join the last step where that still grows.
+
+        Args:
+            before: the choices before the change.
+        """
         if not fields:
             return
         if self._held and not self._still_held():

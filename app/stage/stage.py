@@ -85,6 +85,8 @@ Event = Chosen | Begun | Turned | Asked | Rendered | Parked
 class Stage:
     """All that is chosen, played and shown.
 
+    A motion is what a string or a drum does after a pluck or a blow, as it is drawn; the playhead is a time in it.
+
     Attributes:
         choices: instrument, string and pluck that are shown, where they are heard, what is compared.
         key: the key of an instrument that was struck or restored last; None before the first.
@@ -92,7 +94,8 @@ class Stage:
         known: the player has reported this note.
         request: the motion that is asked for: of the chosen pluck, or of the latest blow; None: there is none.
         take: the motion that is shown.
-        ready, complete: this is the one that is asked for; all of it is rendered.
+        ready: `take` is the motion that is asked for.
+        complete: all of `take` is rendered.
         lead: the note whose time the playhead follows; None: it stands at `parked_s`.
         parked: the note that the playhead was parked from, and does not follow again.
     """
@@ -243,6 +246,7 @@ def changed_names(before: Stage, after: Stage) -> frozenset[str]:
 
 
 def _chosen(stage: Stage, values: Mapping[str, Any]) -> Stage:
+    """The stage with new values of its choices; see `Chosen`. Raises ValueError as `Choices.changed`."""
     instrument = stage.choices.instrument
     if instrument is not None and values.get("preset") == instrument.preset:
         values = {**{name: value for name, value in values.items() if name != "preset"}, "single": None}
@@ -297,7 +301,7 @@ def _rendered(stage: Stage, event: Rendered) -> Stage:
 
 
 def _is_of(note: Note, request: NoteSound) -> bool:
-    """Return True if a note is of the pluck, or of a blow as the one, whose motion is asked for."""
+    """Return True if a note is of the pluck whose motion is asked for; where a blow's is asked for, of any drum."""
     if request.struck is not None:
         return isinstance(note, KeyNote) and note.of_drum
     return note.request is not None and (note.request.preset, note.request.pluck) == (request.preset, request.pluck)
@@ -307,8 +311,8 @@ def _with_own_string(stage: Stage, before: Instrument | None, asked: Collection[
     """The stage that shows string and pluck of an instrument before it is played, and its pluck when that is turned.
 
     Args:
-        before: the instrument that was played.
-        asked: what was chosen with the instrument, as what undo or a file restores, stays.
+        before: the instrument that was played; None: there was none.
+        asked: names of fields that were chosen with the instrument, as by undo or a file; these stay as chosen.
     """
     choices, instrument = stage.choices, stage.choices.played
     if instrument is None or instrument is before or choices.drums is not None:

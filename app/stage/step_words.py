@@ -63,6 +63,7 @@ def turned_fields(before: Mapping[str, Any], after: Mapping[str, Any]) -> frozen
 
 
 def _instrument_words(before: Instrument | None, after: Instrument | None) -> str:
+    """Name the change from one instrument to another; None: there is none."""
     if after is None:
         return "no instrument"
     if before is None:
@@ -77,14 +78,17 @@ def _instrument_words(before: Instrument | None, after: Instrument | None) -> st
 
 
 def field_words(field: str) -> str:
-    """An instrument's field, by its path."""
+    """The words for an instrument's field, by its path, as "pluck.shape"."""
     if field in OF_INSTRUMENTS:
         return OF_INSTRUMENTS[field].name
     return INSTRUMENT.get(field, field.rpartition(".")[2].replace("_", " "))
 
 
 def _changed(before: object, after: object, path: str = "") -> Iterator[str]:
-    """The paths of fields that differ; a part that has fields itself is compared by these, except strings."""
+    """The dotted paths of fields that differ, beginning with `path`.
+
+    A part that has fields itself is compared by these, except strings.
+    """
     for name in _names(after):
         old, new = getattr(before, name), getattr(after, name)
         if old == new:
@@ -105,5 +109,6 @@ def _names(part: object) -> Collection[str]:
 
 
 def _join_words(words: list[str]) -> str:
+    """Join names by "and", each once; SEVERAL where there are more than MOST_NAMED."""
     words = list(dict.fromkeys(words))
     return SEVERAL if len(words) > MOST_NAMED else " and ".join(words)
