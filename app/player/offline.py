@@ -22,7 +22,6 @@ from engine.voices import Mixer
 BLOCK_FRAMES = 4_096
 LONGEST_TAIL_S = 60.0
 SILENT_DB = -80.0  # re full scale: it ends with the last block whose peak is above; 20 dB SPL where that is 100
-STOLEN_S = 0.03
 SYMPATHY_S = 5.0  # for which strings may ring that are not played
 MOST_RINGING = 96  # where more strings ring, the oldest fade out
 
