@@ -20,7 +20,7 @@ from training.cli.console import Failure, ProgressReport
 
 MODELS = ("koopman_var", "koopman", "s5", "lru")
 DRIVER = Path(__file__).with_name("physmodjax_step.py")
-TURNS = 10  # steps of each that are timed
+TURNS = 10
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def measure(python: Path, source: Path, report: ProgressReport) -> dict[str, Any
     for number, name in enumerate(MODELS):
         model, step = train.training_step(name, train.FRAMES)
         sizes = train.BATCH, train.FRAMES, model.grid_points, torch.get_num_threads()
-        own, others = [], []  # seconds and processor seconds of each step, of ours and of theirs
+        own, others = [], []
         with _driver(*map(str, (python, DRIVER, source, name, *sizes))) as answer:
             parameters = count_parameters(model)
             if [parameters] != (theirs := answer()):
@@ -76,10 +76,7 @@ def measure(python: Path, source: Path, report: ProgressReport) -> dict[str, Any
 
 @contextmanager
 def _driver(*command: str) -> Iterator[Callable[[], list[float]]]:
-    """Start a process of another Python, and yield a function that asks it for its next line of numbers.
-
-    The process is ended with the context. The function raises Failure where the process answers no more.
-    """
+    """A process of another Python that answers each line with one of numbers; what asks it."""
     with tempfile.TemporaryFile("w+") as errors:
         try:
             process = subprocess.Popen(command, stdin=PIPE, stdout=PIPE, stderr=errors, text=True)
@@ -89,7 +86,6 @@ def _driver(*command: str) -> Iterator[Callable[[], list[float]]]:
             ) from error
 
         def answer() -> list[float]:
-            """Send an empty line and return the numbers of the line that comes back."""
             assert process.stdin is not None and process.stdout is not None
             with suppress(BrokenPipeError):
                 print(file=process.stdin, flush=True)

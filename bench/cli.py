@@ -62,8 +62,6 @@ def run(
 
 
 def _plain(name: str) -> Callable[[bool], None]:
-    """The command of a benchmark of PLAIN: it calls `measure` of the module of that name, and prints its figures."""
-
     def command(json: Json = False) -> None:
         run(name, lambda report: import_module(f"bench.{name}").measure(report), json, threads=1)
 
@@ -225,7 +223,6 @@ def _notes(folder: Path, most: int | None) -> dict[str, Any]:
 
 
 def _buffer(text: str) -> Buffer:
-    """The buffer that a text names: see `BufferName`. Raises typer.BadParameter: it names none."""
     from pydantic import ValidationError
 
     from app.audio.choices import SoundChoice
@@ -246,7 +243,6 @@ def _instrument(name: str) -> Instrument:
 
 
 def _single(name: str) -> str:
-    """The name of a preset in the library, checked. Raises typer.BadParameter: it is a file elsewhere."""
     from engine.folders import usable_files
     from engine.presets import find_preset
 

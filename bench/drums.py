@@ -105,7 +105,7 @@ def measure(report: ProgressReport) -> dict[str, Any]:
 
 
 def measured_modes() -> tuple[MeasuredMode, ...]:
-    """Computed frequencies of modes whose measured ones are published, as MEASURED_HZ lists them."""
+    """Modes of drums whose frequencies are published."""
     found = []
     for name, measured in MEASURED_HZ.items():
         modes = drum_of(str(DRUM_FILES / f"{name}.toml"), None)[1].modes
@@ -116,7 +116,6 @@ def measured_modes() -> tuple[MeasuredMode, ...]:
 
 
 def _drops(kit: Instrument) -> tuple[PitchDrop, ...]:
-    """The pitch drops of a kit's drums at velocity 127; drums without a published range are left out."""
     keys, found = DrumKeys(kit, Ear((0.5,))), []
     for drum in _drums(kit).drums:
         key = keys.of_key(drum.note)
@@ -128,7 +127,6 @@ def _drops(kit: Instrument) -> tuple[PitchDrop, ...]:
 
 
 def _choice(name: str) -> ChoiceCost:
-    """Measure the processor time in which all keys of an instrument are made, with empty caches; `name`: its file."""
     instrument = read_instrument(FACTORY / f"{name}.json")
     low, high = instrument.range
 
@@ -146,7 +144,6 @@ def _cost(what: str, *played: tuple[Instrument, Sequence[int]]) -> DrumCost:
     """The cost of all these keys of each instrument."""
 
     def struck() -> list[Mixer]:
-        """A mixer for each instrument, with its keys just struck."""
         mixers = []
         for instrument, keys in played:
             mixer, preset = Mixer(RATE_HZ), load_preset(SHIPPED / f"{instrument.preset}.safetensors")
@@ -166,7 +163,7 @@ def _drums(instrument: Instrument) -> Drums:
 
 
 def _of_size(modes: int) -> Instrument:
-    """A tom with about so many modes: the frequency up to which modes count is searched by halving."""
+    """The tom whose modes below a frequency are so many, about."""
     instrument = read_instrument(FACTORY / "tuned_toms.json")
     low, high = 1_000.0, 19_000.0
     for _ in range(8):
@@ -182,6 +179,5 @@ def _below(instrument: Instrument, highest_hz: float) -> Instrument:
 
 
 def _with_mallet(instrument: Instrument) -> Instrument:
-    """The first drum of an instrument, alone and struck by HARD."""
     drum = _drums(instrument).drums[0].model_copy(update={"mallet": HARD})
     return instrument.model_copy(update={"strings": _drums(instrument).model_copy(update={"drums": (drum,)})})

@@ -58,7 +58,6 @@ def measure(report: ProgressReport) -> dict[str, Any]:
         report(number / len(CHOICES), name)
         quanta_us = _quanta_us(effects) - empty_us
         period = 2 * WINDOW_QUANTA
-        # (period,), the median time at each place within two windows
         places = np.median(quanta_us[: len(quanta_us) // period * period].reshape(-1, period), axis=0)
         share, worst_us = float(np.mean(places)) / quantum_us, float(places.max())
         costs.append(EffectsCost(name, effects.tail_s(RATE_HZ), share, worst_us, quantum_us))
@@ -66,7 +65,7 @@ def measure(report: ProgressReport) -> dict[str, Any]:
 
 
 def _quanta_us(effects: Effects | None) -> NDArray[np.float64]:
-    """Processor times of this thread in µs, (quanta,), for each quantum of noise through `effects`; None: without."""
+    """Times of each quantum of noise."""
     mixer = Mixer(RATE_HZ)
     mixer.set_effects(effects)
     frames = round((SECONDS + FILLING_S) * RATE_HZ)

@@ -19,7 +19,7 @@ from training.provenance import processor
 RATE_HZ = 48_000
 EDGES_S = (0.0, 0.05, 1.0, 4.0)  # of the ages of sound that are timed apart
 REPEATS = 5
-STEP_FRAMES = 480  # rendered at a time
+STEP_FRAMES = 480
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,6 @@ class Machine:
 
     @classmethod
     def here(cls) -> Machine:
-        """This machine, with the present limit of torch's threads."""
         return cls(
             os.cpu_count() or 1,
             processor(),
@@ -107,7 +106,6 @@ def shares(make: Callable[[], Sequence[Mixer]]) -> Shares:
 
 
 def _ages_s(mixers: Sequence[Mixer]) -> list[float]:
-    """Processor seconds of rendering all mixers between each two successive EDGES_S."""
     found = []
     for begin_s, end_s in pairwise(EDGES_S):
         began_s = time.thread_time()

@@ -15,9 +15,9 @@ import psutil
 if TYPE_CHECKING:
     from app.window.controller import Controller
 
-START_S, LAB_S = 20.0, 15.0  # until memory is looked at after the start, and in the Lab
+START_S, LAB_S = 20.0, 15.0
 OF_ONE_STRING = "nylon_nonlinear_gaussian_16k_koopman_integrated"  # needs torch
-NOTES, NOTE_S = 20, 0.2  # how many are played, and the time from one to the next
+NOTES, NOTE_S = 20, 0.2
 FIRST_KEY = 45
 
 
@@ -33,7 +33,6 @@ def main() -> int:
 
 
 def _watch(controller: Controller) -> None:
-    """Have the running app print its memory in Play, play notes, change to the Lab, and close at the end."""
     from PySide6.QtCore import QTimer
 
     from app.player.events import NoteOff, NoteOn

@@ -31,7 +31,7 @@ from physmodjax.models.mlp import MLP
 from physmodjax.models.recurrent import LRUDynamicsVarying
 from physmodjax.models.ssm import LRU, S5SSM, BatchStackedSSMModel, LRUDynamics
 
-N = 128  # complex states
+N = 128
 RING: dict[str, Any] = {"d_hidden": N, "r_min": 0.99, "r_max": 1.0, "max_phase": 6.28, "clip_eigs": False}
 CONSISTENCY_WEIGHT = 0.01
 
@@ -75,14 +75,12 @@ def koopman_loss(weights: Any, statistics: Any) -> Any:
 
 
 def state_space_loss(weights: Any, statistics: Any) -> Any:
-    """The mean squared error of the frames after the first; and the statistics of batch normalisation, updated."""
     predicted, statistics = model.apply({"params": weights, **statistics}, initial, mutable=["batch_stats"])
     return jnp.mean((predicted - target) ** 2), statistics
 
 
 @jax.jit
 def step(weights: Any, moments: Any, statistics: Any) -> Any:
-    """Take a step of AdamW: weights, the optimiser's moments and statistics of batch normalisation after it."""
     loss = koopman_loss if NAME.startswith("koopman") else state_space_loss
     gradients, statistics = jax.grad(loss, has_aux=True)(weights, statistics)
     updates, moments = optimiser.update(gradients, moments, weights)

@@ -30,7 +30,7 @@ from training.cli.console import ProgressReport
 
 INSTRUMENTS = ("electric_bass", "classical_guitar", "concert_harp", "sitar")
 NOTES, VELOCITY = 36, 102
-BLOCK_FRAMES, BLOCKS, ROUNDS = 512, 4, 40  # so many blocks are timed at once, so many times
+BLOCK_FRAMES, BLOCKS, ROUNDS = 512, 4, 40
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class PluginCost:
 
     Attributes:
         modes: of the lowest note.
-        app_faster, plugin_faster: how many times faster than real time each is, at 48 kHz in blocks of 512 frames.
+        app_faster, plugin_faster: than real time, at 48 kHz in blocks of 512.
         ratio: of the plug-in to the app.
         busiest_block: share of a core of the plug-in's slowest block in two seconds from the strokes on.
     """
@@ -71,7 +71,6 @@ def measure(report: ProgressReport) -> dict[str, Any]:
 
 
 def _cost(name: str, instrument: Instrument, preset: Preset, instance: Instance) -> PluginCost:
-    """Play NOTES keys at once in the app's player and in `instance` of the plug-in, and time both in turns."""
     low, high = instrument.range
     keys = range(low, min(low + NOTES, high + 1))
     player = OfflinePlayer(instrument, preset, RATE_HZ, {"model": 1.0}, limited=True, varied=True, dry=False)
@@ -92,7 +91,6 @@ def _cost(name: str, instrument: Instrument, preset: Preset, instance: Instance)
 
 
 def _taken_s(render: Callable[[], object], blocks: int = BLOCKS) -> float:
-    """Processor seconds of this thread for so many calls of `render`, a block each."""
     began_s = time.thread_time()
     for _ in range(blocks):
         render()

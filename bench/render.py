@@ -70,7 +70,6 @@ def measure(report: ProgressReport) -> dict[str, Any]:
 
 
 def _untrained(name: str, rate_hz: int, modes: int, sizes: dict[str, int]) -> StringModel[Any]:
-    """A model that is not trained, on the paper's string; `sizes`: those that differ from the paper's."""
     model = build_model(name, dict(sizes))
     physics = Physics(resonator_of(StringParameters(), modes), rate_hz)
     # modes decay one by one, and the integrated phase skips those that have; random eigenvalues would decay at once

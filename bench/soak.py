@@ -30,8 +30,8 @@ from training.cli.console import ProgressReport
 RATE_OF_PLAYING_HZ = 12.0
 PART_S = 60.0  # of one instrument alone
 WEIGHED_S = 10  # at the end of a part: garbage comes and goes
-CHOSEN_PATIENCE_S = 20.0  # until the settings file has a chosen instrument
-SAID_LINES = 20  # of what the program printed, kept in the figures
+CHOSEN_PATIENCE_S = 20.0
+SAID_LINES = 20
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,6 @@ def measure(
 
 
 def _play(app: Program, instrument: Instrument, random: Random, seconds: float) -> _Played:
-    """Play random keys of the chosen instrument for so long, and note the memory after each second."""
     keys_s, weights_mib = [], []
     for _ in range(max(1, round(seconds))):
         steps_s = hands.steady(random, RATE_OF_PLAYING_HZ, min(1.0, seconds))
@@ -162,7 +161,6 @@ def _octave_of_chosen(app: Program, instrument: Instrument) -> int:
 
 
 def _judged(app: Program, played: _Played, clock: CardClock, tone_clock: CardClock) -> Part:
-    """Compute a part's figures from the recordings; the clocks: of the app's, and of the control tone's."""
     begin, end = clock.frame(played.keys_s[0]), clock.frame(played.keys_s[-1] + analysis.SOUNDS_S)
     sound, keys = app.recorded.sound()[begin:end], [clock.frame(key_s) - begin for key_s in played.keys_s]
     holes = analysis.holes(sound, analysis.expected_sound(sound, keys, RATE_HZ), RATE_HZ)

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from app.window.controller import Controller
     from app.window.main_window import MainWindow
 
-LOOK_MS = 5  # between two looks at whether keys sound
-PATIENCE_S = 180.0  # for one start
+LOOK_MS = 5
+PATIENCE_S = 180.0
 # the command line is imported, as it is at a user's start
 COMMAND = "import sys; import app.commands.cli; from bench.start import main; sys.exit(main())"
 
@@ -57,11 +57,6 @@ def measure(count: int, report: ProgressReport) -> dict[str, Any]:
 
 
 def _start() -> dict[str, Any]:
-    """Start the app once: its platform, and the seconds until it was "painted" and "ready".
-
-    Raises:
-        RuntimeError: it did not start.
-    """
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "LEARNED_STRINGS_SETTINGS": str(Path(folder) / "settings.json")}
         environment.pop("PYTHONDONTWRITEBYTECODE", None)  # as at a user's second start
@@ -92,8 +87,6 @@ def main() -> int:
         window.first_painted.connect(lambda: said.update(painted=time.time()))
 
     def watch_for_sound(controller: Controller) -> None:
-        """Note when keys sound, looked at every LOOK_MS, and close the window then."""
-
         def look() -> None:
             if controller.performance.playable:
                 said.update(ready=time.time(), platform=QApplication.platformName())

@@ -93,7 +93,7 @@ def measure_on_gpu(report: ProgressReport) -> dict[str, Any]:
 
 
 def _seeds_timing(name: str, seeds: int) -> SeedsTiming:
-    """Time steps of so many seeds of a model, trained together on random data of the paper's size."""
+    """See `SeedsTiming`. The random data have the paper's size."""
     cells = [Cell(name, True, "noise", 4000, FRAMES, "paper", seed) for seed in range(seeds)]
     configurations = [configuration_of(cell, recipe={"batch_size": BATCH}) for cell in cells]
     modes = torch.randn(1000, FRAMES + 1, configurations[0].data.modes, generator=torch.Generator().manual_seed(0))
@@ -125,7 +125,7 @@ def _launch(runs: list[TrainingState]) -> None:
 
 
 def _seconds(work: Callable[[], None], times: int) -> float:
-    """The mean time of a call in s, of so many in a row; only the end of the last waits for the GPU."""
+    """Seconds of one of some calls, none of which waits for the GPU."""
     torch.cuda.synchronize()
     started = time.perf_counter()
     for _ in range(times):
@@ -135,7 +135,7 @@ def _seconds(work: Callable[[], None], times: int) -> float:
 
 
 def training_step(name: str, frames: int) -> tuple[StringModel[Any], Callable[[], None]]:
-    """A model, and a function that takes its next training step, on one batch of random data of so many frames."""
+    """A model with random data, and what takes its next step."""
     model, batch = _model_and_batch(name, BATCH, frames)
     optimiser = torch.optim.AdamW(model.parameters())
 
@@ -170,7 +170,6 @@ class _Launches(TorchDispatchMode):
 
 
 def _model_and_batch(name: str, strings: int, frames: int) -> tuple[StringModel[Any], Batch]:
-    """An untrained model, and a batch of random data, (strings, frames, grid_points)."""
     model = build_model(name)
     physics = Physics(resonator_of(StringParameters(), 10), 4_000)
     model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(0))

@@ -71,7 +71,6 @@ def measure(report: ProgressReport) -> dict[str, Any]:
 
 
 def _voices(path: Path) -> list[VoiceCost]:
-    """Measure a voice of a preset's model and one of its truth, each plucked once and never ended."""
     preset = load_preset(path)
     info, model = preset.info, model_program(preset, RATE_HZ)
     assert model is not None
@@ -91,7 +90,6 @@ def _voices(path: Path) -> list[VoiceCost]:
 
 
 def _notes(name: str) -> NotesCost:
-    """Measure up to MOST_KEYS keys of an instrument, struck at once; `name`: as `instruments` lists it."""
     instrument = find_instrument(name).instrument
     instrument = instrument.model_copy(update={"sympathy_s_kg": 0.0, "noise": Noise()})
     preset = load_preset(SHIPPED / f"{instrument.preset}.safetensors")

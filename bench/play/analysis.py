@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 ZERO = 1e-7  # samples below it are silence
-SHORTEST_HOLE_S = 0.001  # a shorter silence is no hole
+SHORTEST_HOLE_S = 0.001
 SOUNDS_S = 0.5  # for how long a pluck is heard at least
-NEARBY_S = 0.025  # of the residual before or after an event, with which that is compared
-ORDER = 32  # of the prediction: frames that it is made from
-FIT_S = 0.01  # the length of a step of the fit
-FITTED_STEPS = 4  # to which a prediction is fitted
+NEARBY_S = 0.025
+ORDER = 32  # of the prediction
+FIT_S = 0.01
+FITTED_STEPS = 4
 STEP_S = 0.00025  # places of events are searched in such steps
 STANDS_OUT = 6.0  # an event's residual is so many times the residual nearby
 MOSTLY = 0.9  # quantile of the residual nearby
-FAINTEST_CLICK = 1e-4  # residual, re full scale; a smaller one is no click
-FAINTEST_PLUCK = 1e-6  # sample or residual, re full scale, from which a pluck counts
+FAINTEST_CLICK = 1e-4
+FAINTEST_PLUCK = 1e-6
 ATTACK_S = 0.006  # of a pluck
 LATEST_S = 0.5  # from a key to the beginning of its pluck, at most
 EARLY_OR_LATE_S = 0.04  # deviation of a pluck's latency from the usual one, at most
@@ -93,7 +93,7 @@ class Unpredicted:
 
 def unpredicted(sound: NDArray[np.floating], rate_hz: int) -> Unpredicted:
     """Residuals of predictions fitted to `FITTED_STEPS` steps of `FIT_S` and used in the step after, or before."""
-    size = round(FIT_S * rate_hz)  # frames of a step
+    size = round(FIT_S * rate_hz)
     steps = -(-len(sound) // size)
     signal = np.concatenate([np.zeros(ORDER), np.asarray(sound, float), np.zeros(steps * size - len(sound))])
     rows = sliding_window_view(signal, ORDER + 1)  # the last entry of row n is frame n, the others what came before
@@ -130,8 +130,8 @@ class Events:
 
 def events(rest: Unpredicted, rate_hz: int) -> Events:
     """The events of residuals. Several within `ATTACK_S` count as one."""
-    step = round(STEP_S * rate_hz)  # frames
-    near = round(NEARBY_S / STEP_S)  # steps
+    step = round(STEP_S * rate_hz)
+    near = round(NEARBY_S / STEP_S)
     gap = 2 + -(-ORDER // step)  # a click disturbs all predictions that it is part of
 
     def highest_of_steps(left: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -145,7 +145,7 @@ def events(rest: Unpredicted, rate_hz: int) -> Events:
         ranges = [left[index * step : (index + 1) * step] for index in kept]
         return tuple(i * step + int(np.argmax(part > 0.5 * part.max())) for i, part in zip(kept, ranges, strict=True))
 
-    size = highest_of_steps(rest.by_both)  # (steps,), the largest residual of each
+    size = highest_of_steps(rest.by_both)
     spikes = (size > FAINTEST_CLICK) & (size >= _highest(size, -1, 1))
     spikes &= size > STANDS_OUT * _quantile(size, -near, -2, MOSTLY)  # a quantile, to ignore other clicks nearby
     spikes &= size > STANDS_OUT * _quantile(size, gap, near, MOSTLY)
@@ -163,10 +163,6 @@ def matched(
     """The beginning of each key's pluck: the strongest event about `usual` frames after it; None without one.
 
     An event that is much earlier or later is not matched; `untimely` finds it.
-
-    Args:
-        keys: frames at which keys were pressed.
-        strength: the residual, (frames,); the strongest event is the one where it is largest.
     """
     farthest = round(EARLY_OR_LATE_S * rate_hz)
     places = np.array(sorted({*found.plucks, *found.spikes}), int)
@@ -180,10 +176,9 @@ def matched(
 
 
 def untimely(found: Events, plucked: Sequence[int | None], rate_hz: int) -> list[int]:
-    """Beginnings of plucks, as frames, that are not among the beginnings `plucked` of keys.
+    """Beginnings of plucks that are no key's: of a window that was kept from its core, as a rule, which plucks late.
 
-    As a rule the window got no processor time and plucked late. They are no clicks, after which a residual is as
-    small as before.
+    They are no clicks, after which a residual is as small as before.
     """
     apart = round(ATTACK_S * rate_hz)
     taken = [place for place in plucked if place is not None]
@@ -259,7 +254,6 @@ def _begins_at_once(rest: NDArray[np.float64], place: int) -> bool:
 
 
 def _runs(where: NDArray[np.bool_]) -> list[Span]:
-    """The spans in which `where` (frames,) is true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], where.astype(np.int8), [0]])))
     return [Span(int(start), int(end)) for start, end in zip(edges[::2], edges[1::2], strict=True)]
 

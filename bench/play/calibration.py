@@ -23,23 +23,18 @@ from bench.play.recording import Recording
 from bench.play.sound_server import RATE_HZ, SoundServer
 
 LATENCIES_S = (0.01, 0.02, 0.05, 0.1, 0.2)  # requested of the device
-CLICKS = 8  # at each latency
-LOOK_S = 0.03  # between two samples of what the server has buffered
+CLICKS = 8
+LOOK_S = 0.03
 LEAST = 0.1  # quantile of what the server has buffered: programs hand over sound when that is least
-PATIENCE_S = 20.0  # for the clicks of one latency
-BLOCK_FRAMES = 256  # that the device asks for at a time
-FIRST_S = 0.5  # the first click, after the start
-EVERY_S = 0.107  # from click to click; no multiple of a block
+PATIENCE_S = 20.0
+BLOCK_FRAMES = 256
+FIRST_S = 0.5
+EVERY_S = 0.107  # no multiple of a block
 
 
 @dataclass(frozen=True)
 class Handed:
-    """Clicks at one buffer length.
-
-    Attributes:
-        times_s: when the device was handed each, by `time.monotonic`.
-        held_s: how much sound the server had buffered.
-    """
+    """Clicks at one buffer length: when they were handed over, and how much the server had buffered, in s."""
 
     times_s: tuple[float, ...]
     held_s: float
@@ -49,7 +44,7 @@ class Handed:
 class Holding:
     """The sound of a client that the server has buffered, in s, sampled repeatedly."""
 
-    looks_s: list[float] = field(default_factory=list)  # each sample
+    looks_s: list[float] = field(default_factory=list)
 
     def look(self, server: SoundServer) -> None:
         held_s = server.buffered_s()
@@ -65,10 +60,7 @@ class Holding:
 class Transit:
     """The time from a program's handing over of sound until it is in the recording, by what the server has buffered.
 
-    Attributes:
-        held_s: what the server has buffered, (buffer lengths,), ascending.
-        transit_s: the time at each of these, the median of its clicks.
-        spread_s: nine of ten clicks deviate by no more from the median of their buffer length.
+    `spread_s`: nine of ten clicks deviate by no more from the median of their buffer length.
     """
 
     held_s: tuple[float, ...]
@@ -104,10 +96,10 @@ def click_through(server: SoundServer) -> list[Handed]:
 
 
 def transit(clicks: Sequence[Handed], recorded: Recording) -> Transit:
-    """The transit times of clicks, found in the recording of them all; a click that was not recorded is left out."""
+    """The transit time of clicks, from the recording of them all."""
     clock = recorded.clock()
     sound = np.abs(recorded.sound()[:, 0])
-    held_s, transit_s, apart_s = [], [], [0.0]  # by buffer length; of all clicks: their deviations from its median
+    held_s, transit_s, apart_s = [], [], [0.0]
     for handed in clicks:
         ways_s = []
         for time_s in handed.times_s:

@@ -28,7 +28,7 @@ PATIENCE_S = 20.0
 
 @contextlib.contextmanager
 def steady_tone(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[Recording]:
-    """Play the tone in a process of its own, and yield its recording, until the block ends."""
+    """Play and record it until the block ends."""
     load = ["pactl", "load-module", "module-null-sink", f"sink_name={SINK}", f"rate={RATE_HZ}", f"format={FORMAT}"]
     subprocess.run([*load, f"channels={CHANNELS}"], env=server.environment, check=True, capture_output=True)
     command = [sys.executable, "-m", "bench.play.control", str(buffer)]

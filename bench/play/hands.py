@@ -14,8 +14,8 @@ KEYS = ("a", "w", "s", "e", "d", "f", "t", "g", "y", "h", "u", "j", "k", "o", "l
 ROW = ("a", "s", "d", "f", "g", "h", "j", "k", "l", "semicolon")  # places along a single string
 LOWEST = 48  # the MIDI key that the first of them plays
 OCTAVE_DOWN, OCTAVE_UP = "z", "x"
-HELD_S = 0.03  # from pressing a key to its release
-SHORTEST_STEP_S = 0.04  # from key to key
+HELD_S = 0.03
+SHORTEST_STEP_S = 0.04
 
 
 def octave_of(instrument: Instrument | str) -> int:
@@ -33,7 +33,6 @@ def keys_of(instrument: Instrument | str) -> tuple[str, ...]:
 
 
 def _sounding(instrument: Instrument, octave: int) -> list[int]:
-    """Places in KEYS of the computer's keys that sound where they are shifted by so many octaves."""
     (low, high), drums = instrument.range, instrument.strings if isinstance(instrument.strings, Drums) else None
     midi = [(place, LOWEST + 12 * octave + place) for place in range(len(KEYS))]
     return [place for place, key in midi if low <= key <= high and (drums is None or drums.of_key(key) is not None)]

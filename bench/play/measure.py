@@ -25,11 +25,11 @@ from training.cli.console import ProgressReport
 
 SINGLES = 60
 RINGS_S, QUIET_S = 0.4, 0.3  # of a single pluck, before and after it is stopped
-SILENCE_S = 1.0  # without sound, after which all has decayed
-DECAY_PATIENCE_S = 30.0  # for all to decay
-IDLE_S = 5.0  # of silence that is measured
-HOLDING_LOOKS = 40  # samples of what the server has buffered
-STOP = "space"  # the key that stops all sound; in silence it plucks
+SILENCE_S = 1.0
+DECAY_PATIENCE_S = 30.0
+IDLE_S = 5.0
+HOLDING_LOOKS = 40
+STOP = "space"
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,6 @@ def measure(
 def _play(
     app: Program, random: Random, keys: Sequence[str], steps_s: Sequence[float], report: ProgressReport
 ) -> _Played:
-    """Play SINGLES keys, each stopped again, then random keys `steps_s` apart; times are by `time.monotonic`."""
     singles_s = []
     for number in range(SINGLES):
         report(0.1 + 0.4 * number / SINGLES, "single plucks")
@@ -171,7 +170,6 @@ def _play(
 
 
 def _judged(app: Program, played: _Played, idle_cores: float | None) -> Playing:
-    """Compute the figures of what was played from the recordings of the app and of the control tone."""
     clock, sound, way = app.recorded.clock(), app.recorded.sound(), transit(app.clicks, app.recorded)
     first = np.flatnonzero(np.abs(sound[(start := clock.frame(app.started_s)) :, 0]) > analysis.FAINTEST_PLUCK)
     onsets = [analysis.onset(sound[:, 0], clock.frame(key_s), RATE_HZ) for key_s in played.singles_s]
@@ -223,7 +221,6 @@ def _judged(app: Program, played: _Played, idle_cores: float | None) -> Playing:
 
 
 def _idle_cores(app: Program) -> float | None:
-    """Processor seconds per second of the program during IDLE_S of silence; None: it does not fall silent."""
     if not app.recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S):
         return None
     before_s, before_processor_s = time.monotonic(), app.processor_s()

@@ -80,7 +80,6 @@ class Program:
         return sum(self._of_each(lambda one: one.memory_info().rss / 2**20))
 
     def _of_each(self, figure: Callable[[psutil.Process], float]) -> list[float]:
-        """A figure of the program's process and of each of its children, up to the first that has ended."""
         found: list[float] = []
         with contextlib.suppress(psutil.NoSuchProcess):  # one that has ended
             parent = psutil.Process(self.process.pid)
@@ -96,7 +95,7 @@ def program(
     """Start the program with an instrument, and wait until its first key is heard. A single string is in the Lab.
 
     Args:
-        calibrated: whether clicks are played first, which give the latency of server and recorder.
+        calibrated: clicks are played first.
 
     Raises:
         Missing: a program or library is not there.
@@ -129,7 +128,6 @@ def program(
 
 @contextlib.contextmanager
 def _started(settings: Path, printed: Path, server: SoundServer, screen: Screen) -> Iterator[subprocess.Popen[bytes]]:
-    """Start the program with this settings file, on this server and screen; all it prints is written to `printed`."""
     environment = {
         **server.environment,
         "DISPLAY": screen.name,
@@ -144,7 +142,7 @@ def _started(settings: Path, printed: Path, server: SoundServer, screen: Screen)
 
 
 def _show(screen: Screen, process: subprocess.Popen[bytes]) -> float:
-    """Wait for the program's window, give it screen and keyboard focus, and return when it was to be seen."""
+    """Wait for the program's window, and give it the screen; return when it was to be seen."""
     deadline_s = time.monotonic() + START_PATIENCE_S
     while (window := screen.find(TITLE)) is None:
         if process.poll() is not None or time.monotonic() > deadline_s:

@@ -75,13 +75,12 @@ class Recording:
 
     def __init__(self, pipe: IO[bytes], path: Path) -> None:
         self._pipe, self._path = pipe, path
-        self._arrivals: list[tuple[int, float]] = []  # of each block: frames in all, and when (`time.monotonic`)
-        self.sounded_s = -np.inf  # when the last audible block arrived; -∞: none has
+        self._arrivals: list[tuple[int, float]] = []
+        self.sounded_s = -np.inf  # when the last audible frame arrived
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
 
     def _read(self) -> None:
-        """Write what the pipe brings to the file, and note when it came, until the pipe ends; the thread."""
         size = 0
         with self._path.open("wb") as file:
             while data := self._pipe.read(READ_BYTES):
@@ -119,7 +118,6 @@ class Recording:
         return np.memmap(self._path, np.float32, "r", shape=(frames, CHANNELS))
 
     def clock(self) -> CardClock:
-        """The clock of the sound card, from all arrivals so far but the first."""
         frames, times_s = np.array(self._arrivals[1:], float).T
         return CardClock.through(frames, times_s)
 

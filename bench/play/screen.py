@@ -48,7 +48,7 @@ class Screen:
         return None
 
     def take(self, window: Window) -> None:
-        """Make a window as large as the screen and give it the keyboard focus, as a window manager does."""
+        """Make a window as large as the screen and give it the keyboard, as a window manager does."""
         from Xlib import X
 
         window.configure(x=0, y=0, width=SIZE[0], height=SIZE[1], stack_mode=X.Above)

@@ -15,7 +15,7 @@ from training.recording.note import note_of
 from training.recording.numbering import number_note
 
 QUIETEST_DB = -50.0  # below a note's loudest partial: those below are not counted
-NUMBERED_CENTS = 50.0  # error of the fundamental, beyond which a note counts as misnumbered
+NUMBERED_CENTS = 50.0
 FIRST_SEED = 3_000  # `intervals.MODEL_ERRORS` was measured on notes of seeds below it
 UNITS = {"hz": 1200 / math.log(2), "decay": 1.0, "level_db": 1.0}  # of the errors: cents, a share, dB
 
@@ -31,7 +31,6 @@ def coverage(seeds: Iterable[int], progress: Callable[[int], None] = lambda done
     Widths are medians, errors root mean squares, in cents, shares and dB. Also how many partials, and how many notes
     are misnumbered.
     """
-    # by figure, a value for each partial
     held: dict[str, list[float]] = {name: [] for name in UNITS}
     widths: dict[str, list[float]] = {name: [] for name in UNITS}
     errors: dict[str, list[float]] = {name: [] for name in UNITS}

@@ -31,8 +31,7 @@ class NoteErrors:
 
     Attributes:
         gate: the findings, or the reason of the refusal.
-        esr, late_esr: error-to-signal ratio (ESR) of the learned note, from 8 ms and from 50 ms after its onset.
-        distance_db: the log spectral distance of that note.
+        esr, late_esr, distance_db: of the own note, the second from 50 ms on, the third log spectral.
         one_pole, two_poles: ESR of linear poles for each partial.
         half, half_two_poles: ESR of the unseen half, and that of two linear poles.
     """
@@ -78,11 +77,6 @@ def measure(
 
 
 def _errors(name: str, samples: NDArray[np.float64], rate_hz: int, quick: bool) -> NoteErrors:
-    """Learn a recording, (frames,) or (frames, channels), and measure its errors; `quick`: those of the note alone.
-
-    Raises:
-        RecordingError: the recording is refused.
-    """
     note = note_of(samples, rate_hz)
     series = number_note(note)
     findings = examine(samples, note, series)
@@ -109,7 +103,6 @@ def _errors(name: str, samples: NDArray[np.float64], rate_hz: int, quick: bool) 
 
 
 def _figures(found: Sequence[NoteErrors]) -> tuple[Figure, ...]:
-    """Median and 90th percentile of each figure; those that no recording has are left out."""
     figures = []
     for each in fields(NoteErrors)[2:]:
         values = [value for one in found if (value := getattr(one, each.name)) is not None]

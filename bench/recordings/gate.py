@@ -45,11 +45,9 @@ class KindShare:
 
 
 def measure(recordings: Recordings, count: int, every: int, report: ProgressReport) -> dict[str, Any]:
-    """Examine recordings and synthetic notes that no threshold was set on, and count how each kind ends.
+    """Examine judged recordings and seeds.
 
     Args:
-        recordings: by name.
-        count: of synthetic notes.
         every: all that is no note and passes the gate is fitted, and one of so many notes; 0: nothing is.
     """
     judged = {name: sound for name, sound in recordings.items() if is_judged(name)}
@@ -71,7 +69,7 @@ def measure(recordings: Recordings, count: int, every: int, report: ProgressRepo
 
 
 def _end(case: Case, fitted: bool) -> tuple[str, str]:
-    """Examine a case, and learn it where it is `fitted`, as the command does; return the end and its reason."""
+    """Examine a case, and learn it where it is `fitted`, as the command does."""
     try:
         found = examined(*case.sound)
     except RecordingError as error:

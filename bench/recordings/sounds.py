@@ -44,7 +44,7 @@ class Case:
 
 
 def is_judged(name: str) -> bool:
-    """Return True if a recording is of the half that judges; thresholds are set on the other half."""
+    """The half of a recording: thresholds are set on the other."""
     return sum(name.encode()) % 2 == 1
 
 
@@ -71,7 +71,6 @@ def cases(recordings: Recordings, count: int, seed: int) -> Iterator[Case]:
 
 
 def _no_notes(recordings: Recordings, count: int, seed: int) -> Iterator[Case]:
-    """Cases that are to be refused: chords, loops, clipped notes and the like, and `count` sounds of OTHERS."""
     notes = [(name, sound) for name, sound in recordings.items() if NO_STRING not in name]
     random = np.random.default_rng([seed, 2])
     for number in range(count):
@@ -79,7 +78,7 @@ def _no_notes(recordings: Recordings, count: int, seed: int) -> Iterator[Case]:
         real = number % 2 == 0 and len(notes) > 3
         name, first = notes[int(random.integers(len(notes)))] if real else (base, random_pluck(seed + 5_000 + number))
         second = notes[int(random.integers(len(notes)))][1] if real else random_pluck(seed + 7_000 + number)
-        made = number // 2 % 8  # which kind is made of them
+        made = number // 2 % 8
         if made < 3:
             for level_db in CHORD_DB if made == 0 else (float(random.choice(CHORD_DB)),):
                 if (sound := chord(first, second, level_db)) is not None:
@@ -122,7 +121,6 @@ def loop(random: Random, samples: Array, rate_hz: int) -> Sound:
 
 
 def sweep(random: Random, number: int = 0) -> Sound:
-    """A tone of 2 s that glides between two random frequencies and may decay."""
     rate_hz = 44_100
     t = np.arange(2 * rate_hz) / rate_hz
     low, high = np.exp(random.uniform(math.log(50), math.log(8_000), 2))
