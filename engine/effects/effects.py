@@ -69,7 +69,7 @@ def _impulse(effects: Effects, rate_hz: int) -> NDArray[np.float64]:
 def _parts(
     body: Body | None, room: Room | None, rate_hz: int
 ) -> tuple[tuple[NDArray[np.float64], ...], NDArray[np.float64]]:
-    """The responses (frames, 2) of body, room, and both in series, and their powers (4, 4, 4).
+    """The responses (frames, 2) of body, room, and both in series, and the powers (4, 4, 4) of `powers_of`.
 
     What is not there has no frames.
     """

@@ -88,7 +88,10 @@ def in_series(one: Response, other: Response) -> Response:
 
 
 def powers_of(body: Response, room: Response, rate_hz: float) -> NDArray[np.float64]:
-    """The powers (4, 4, 4) that `weights_of` needs; what is not there has no frames."""
+    """The powers (4, 4, 4) that `weights_of` needs; what is not there has no frames.
+
+    The first axis is the case (1: body alone, 2: room alone, 3: both), the others the parts, as of `weights_of`.
+    """
     powers = np.empty((4, 4, 4))
     responses.all_powers(_work_at(len(body) + len(room), rate_hz), stereo(body), stereo(room), float(rate_hz), powers)
     return powers

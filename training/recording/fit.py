@@ -114,7 +114,8 @@ def _steps(
 ) -> list[tuple[float, Callable[[], None]]]:
     """The steps of a fit in order, each with the share that is done after it."""
 
-    def start() -> None:  # one pole a band, the same in all takes
+    def start() -> None:
+        """Begin each band with one pole: that of the loudest take there, else a plain one at its frequency."""
         for number in range(len(hz)):
             plain = Pole(complex(-3.0, 2 * math.pi * hz[number]), partial=number + 1)
             first = _loudest(takes, number).start(number, 1) or [plain]
