@@ -201,7 +201,7 @@ class HeardNote:
         return f"{self.name}{kind}{ending}"
 
     def export(self, choices: ExportChoices, folder: Path) -> NoteExport:
-        """Its export with these choices; the difference has the gain with which it is heard."""
+        """The export of the sound with these choices; the difference has the gain with which it is heard."""
         if choices.source == self.source == "difference":
             choices = choices.model_copy(update={"difference_gain_db": self.difference_gain_db})
         path = folder / self.file_name(choices.source, choices.ending)

@@ -164,7 +164,7 @@ class Fit:
     # Steps
 
     def start(self, number: int, count: int) -> list[Pole]:
-        """At most `count` poles to start from in the band `number`, without amplitudes, by its complex envelope."""
+        """The first poles in the band `number`, `count` or fewer, without amplitudes, by its complex envelope."""
         first, last = (round(self.edges_hz[edge] / self.step_hz) for edge in (number, number + 1))
         envelope = fft.ifft(self.data[first:last])
         step = self.size / ((last - first) * self.rate_hz)

@@ -75,7 +75,7 @@ class HeardPerformance:
     name: str
 
     def export(self, choices: ExportChoices, folder: Path, name: str = "") -> PlayedExport:
-        """Its export, by default to the file of its own name. Raises ValueError: nothing plays it."""
+        """The export of what is played, by default to a file of its name. Raises ValueError: nothing plays it."""
         if self.preset is None:
             missing = self.played.instrument.preset
             raise ValueError(f"The preset {missing}, which plays the instrument, was not found.")
