@@ -224,6 +224,7 @@ class ComparePanel(ComputedPanel):
         if self.background.busy:
             self.background.cancel()
             self._set_computing(None)
+            self._show(whole=False)
         else:
             shown_rows = [self._row(entry) for entry in self._entries]
             undone = [row for row, fresh in shown_rows if not fresh or row.mae is None]

@@ -15,6 +15,7 @@ from app.analysis import error_plane
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS
 from app.views import theme
 from app.views.controls.elided_label import ElidedLabel
+from app.window.panels import compare
 from engine.pluck import Pluck
 from tests.app.window.driver import KEY, LEFT, choose, find, press
 from tests.app.window.panels.conftest import at, items
@@ -168,13 +169,15 @@ def menu_of(panel: Any) -> list[QAction]:
     return find(panel, QToolButton, "Presets to compare").menu().actions()
 
 
-def test_presets_are_compared_and_exported(lab, tmp_path):
-    lab.window.action["models"].trigger()
-    panel, both = lab.panel("compare"), {"first", "second"}
-    assert lab.choices.right_view == "compare" and panel.table.hasFocus()
-    lab.wait(lambda: panel.background.busy)
-    press(panel, "Stop comparing")
-    assert panel.progress.share is None and not panel.background.busy
+def test_presets_are_compared_and_exported(lab, tmp_path, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr(compare, "compare", lambda _, job: (job.report(0.5), job.wait(60.0)))
+        lab.window.action["models"].trigger()
+        panel, both = lab.panel("compare"), {"first", "second"}
+        assert lab.choices.right_view == "compare" and panel.table.hasFocus()
+        lab.wait(lambda: words_of(panel).endswith(" left"))
+        press(panel, "Stop comparing")
+    assert panel.progress.share is None and not panel.background.busy and "left" not in words_of(panel)
     press(panel, "Compare again")
     lab.wait(lambda: computed(panel) == both)
     before = figures(panel)
