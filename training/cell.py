@@ -39,6 +39,7 @@ MODEL_NAMES = {
     "frnn": "FRNN",
 }
 
+KNOWLEDGE_RECIPES = ("blind", "hinted")  # named by what the model knows of the string
 TITLE_WORDS = {  # where a musician would not know the tables' name
     "koopman_var": "Koopman, variable",
     "koopman_integrated": "Integrated phase",
@@ -109,7 +110,7 @@ class Cell:
         start = "plucks" if self.initial == "gaussian" else "random shapes"
         details = [TITLE_WORDS.get(self.model, MODEL_NAMES[self.model])]
         if self.recipe != RECIPE:
-            details.append(self.recipe if self.recipe in ("blind", "hinted") else f"{self.recipe} recipe")
+            details.append(self.recipe if self.recipe in KNOWLEDGE_RECIPES else f"{self.recipe} recipe")
         if self.horizon != HORIZON:
             details.append(f"trained on {1000 * self.horizon / self.rate_hz:g} ms")
         if self.seed:

@@ -214,7 +214,10 @@ def row_errors(
 
 
 def _columns(form: str, sums: ErrorSums) -> dict[str, float | None]:
-    """The total errors and their standard errors by column; `form`: see `figures`, None: it is not finite."""
+    """The total errors and their standard errors by column; None where one is not finite.
+
+    `form`: a column's name, in which {} stands for rel_mse and rel_mae, as in `figures`.
+    """
     values = figures(sums.total(), form) | figures(sums.standard_error(), f"{form}_se")
     return {name: value if math.isfinite(value) else None for name, value in values.items()}
 

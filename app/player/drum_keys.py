@@ -136,11 +136,15 @@ def tuned(drum: DrumParameters, ratio: float, highest_hz: float) -> DrumModes:
 
 
 def block_of(drum_key: DrumKey) -> Array:
-    """The drum of a key as the kernels read it: see `records.DRUM`."""
+    """The drum of a key as the kernels read it: the record `records.DRUM`, then DRUM_ROWS rows of its modes.
+
+    It is an array of float64 (slots,).
+    """
     modes = len(drum_key.modes)
     block = np.zeros(DRUM.itemsize // 8 + DRUM_ROWS * modes)
     drum = struck_drum(drum_key.played, drum_key.modes.drum)
-    kernel.write(drum, drum_key.modes.rows, np.array(drum_key.points), tools(), block.ctypes.data, modes)
+    work = tools()
+    kernel.write(drum, drum_key.modes.rows, np.array(drum_key.points), work, block.ctypes.data, modes)
     return block
 
 

@@ -109,7 +109,11 @@ class Ahead:
 
 
 def _lead_s(note: PluckVoices) -> float:
-    """The lead of a note in s, to compare notes: one that waits or fades out counts as SAFE_S farther ahead."""
+    """The lead of a note in s, to compare notes: one that waits or fades out counts as SAFE_S farther ahead.
+
+    Of one that waits all that is rendered counts. One that needs no more samples counts as rendered to 0: it is
+    begun soon, and leaves the list.
+    """
     rendered_s = min((samples.rendered_s for samples in note.unfinished), default=0.0)
     if note.released:
         return rendered_s - note.seconds + SAFE_S

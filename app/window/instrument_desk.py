@@ -470,9 +470,13 @@ class InstrumentDesk(BrowserDesk):
         return (LOWEST_OCTAVE, HIGHEST_OCTAVE) if self.instrument is None else octaves_of(*self.instrument.range)
 
     def _keep_octave_in_range(self, by_user: bool) -> None:
-        """Move the octave of the computer's keys to where one sounds, or most do with another range; say why.
+        """Move the octave of the computer's keys to one in which a key sounds; say why.
 
-        `by_user`: the octave was to change; otherwise another instrument made it change.
+        Where other keys sound than before, it is the nearest octave in which nearly as many sound as in any. A knob
+        changes no keys, and moves nothing.
+
+        Args:
+            by_user: whether the octave was to change; otherwise another instrument made it change.
         """
         instrument = self.instrument
         octave = self._session.choices.octave

@@ -28,8 +28,8 @@ class Leaving(QObject):
         self._waits = False  # for an export or a recording to be saved, to close the window then
         self._asking = False  # a question is open
         window.may_close = self.may_close
-        exports.ended.connect(self._export_ended)
-        recordings.written.connect(self._export_ended)
+        exports.ended.connect(self._end_wait)
+        recordings.written.connect(self._end_wait)
 
     def may_close(self) -> bool:
         """Return True if the window may be closed now; ask where work would be lost."""
@@ -73,8 +73,11 @@ class Leaving(QObject):
             return not self._waits
         return False
 
-    def _export_ended(self, well: bool) -> None:
-        """Close the window if it waits for this, and the file was written (`well`)."""
+    def _end_wait(self, well: bool) -> None:
+        """Close the window if it waits for this export or recording, and the file was written (`well`).
+
+        After a failure the window stays, and waits no more.
+        """
         waited, self._waits = self._waits, False
         if waited and well:
             self._window.close()

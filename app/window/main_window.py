@@ -177,7 +177,7 @@ class MainWindow(QMainWindow):
         self._more = Overflow("the Lab")
         self._head = head = filled(QHBoxLayout(), self._menu_button, self.faces, self._brand)
         head.addWidget(self.presets, 1)
-        head.addStretch(0)
+        head.addStretch(0)  # takes the room where the presets are hidden, as in Play
         badges = (self.growth_sign, self.rate_label, self.notices.bell)
         filled(head, self._keys_button, test, self._more, *badges, self._audio_button)
         self._facts = QWidget()

@@ -161,11 +161,16 @@ def _generate(mixer: Mixer, strings: int, first: bool) -> None:
 
 @kernel
 def _ring(mixer: Mixer, strings: int, shared: int) -> None:
-    """Write a quantum of strings that are latents with one tension, which meet at the bridge after each frame.
+    """Write a quantum of strings that a model plays; the latents of each share its own tension.
 
-    `shared`: their lowest modes that may have a part in the bridge.
+    They meet at the bridge after each frame.
+
+    Args:
+        strings: how many of `mixer.generated`, 1 to 3 (MOST_COURSE).
+        shared: their lowest modes that may have a part in the bridge.
     """
-    scratch, blocks = mixer.scratch[:], lanes.blocks_of(shared)
+    scratch, blocks = mixer.scratch[:], lanes.blocks_of(shared)  # one mode a lane
+    # `lanes.meet` takes three first slots of the scratch, and uses those of as many strings as there are.
     one = _string(mixer, 0)
     other = _string(mixer, min(1, strings - 1))
     third = _string(mixer, strings - 1)

@@ -110,9 +110,10 @@ def gain_of(player: Player, table: Table, key: int) -> float:
 
 @kernel
 def take(player: Player, table: Table, note: Note) -> bool:
-    """Set a note's gain and its blow's strength and hardness, by its key's drum; return False if there is none.
+    """Mark a note as a drum's; set its gain, and the strength and hardness that its stroke's noise has.
 
-    A drum with more modes than the player's voices hold counts as none.
+    The strength is the mallet's speed over that at REFERENCE_VELOCITY with an even curve, as in `gain_of`. Returns
+    False where the key has no drum; one with more modes than the player's voices hold counts as none.
     """
     note.drum = 1
     if not has_drum(table, note.key) or drum_of(table, note.key).modes > player.modes:

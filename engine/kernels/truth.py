@@ -18,11 +18,15 @@ from engine.kernels.rotation import rotation
 
 @kernel
 def _sub_steps(voice: at.Voice, program: at.TruthProgram) -> int:
-    """The number of sub-steps of a frame, by the highest mode that moves; 0: what is linear needs none."""
+    """The number of sub-steps of a frame: `program.substeps` in a period of the highest mode that moves.
+
+    A string that may touch its bridge's edge (`engine.kernels.javari`) takes a multiple of `javari.steps`: so many
+    times a frame the contact's force is computed. What is linear needs no others; 0: none at all.
+    """
     n = voice.modes
     squares, couplings = row(voice, at.OMEGA_SQUARED), row(voice, at.COUPLING)
     steps = voice.javari.steps
-    if couplings[n - 1] == 0.0:
+    if couplings[n - 1] == 0.0:  # linear: the tension moves all modes or none
         return steps
     highest = math.sqrt(squares[voice.moving - 1])
     count = max(1, math.ceil(program.substeps * highest / (2 * math.pi * program.rate_hz)))

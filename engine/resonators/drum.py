@@ -155,7 +155,7 @@ class DrumModes:
         return self.surface.shapes(np.asarray(places, dtype=np.float64)) * self.scale[:, None]
 
     def damped(self, d1_kg_m2_s: float, d3_kg_s: float) -> DrumModes:
-        """The same with other damping, which takes no time."""
+        """The same modes with other damping. They stay, since ω is undamped; σ is computed when it is asked for."""
         return replace(self, drum=replace(self.drum, damping_d1_kg_m2_s=d1_kg_m2_s, damping_d3_kg_s=d3_kg_s))
 
     def resonator(self, places: Array, *, tension_modulated: bool = True) -> Resonator:

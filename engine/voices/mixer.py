@@ -122,7 +122,8 @@ class Mixer(KernelMemory):
     def set_player(self, player: CompiledPlayer) -> None:
         """Set the player whose events are played from the next quantum on; the present one's notes ring on.
 
-        The notes of the player before the present one fade out.
+        The present one becomes the player before, whose events are still played. The one that was that so far has
+        no events any more: its voices, which the mixer holds, fade out in LEFT_S.
 
         Raises:
             ValueError: it is of another rate.
@@ -133,7 +134,9 @@ class Mixer(KernelMemory):
             present, before = (int(self.record[name]) for name in ("player", "player_before"))  # addresses; 0: none
             if present == player.address:
                 return
+            # All are stamped again: a quantum that has begun may still play those that leave.
             self._players = [(other, self.frames) for other, _ in self._players if other is not player]
+            # This comes first: a quantum in between finds the present player twice, and plays it once.
             self.publish("player_before", present)
             self.publish("player", player.address)
             for other, _ in self._players:

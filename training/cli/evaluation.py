@@ -316,6 +316,7 @@ class _Measurement:
 
 
 def _sound(errors: RelativeError, distance: SpectralDistance) -> dict[str, float]:
+    """The figures of the sound at the listening point over one window, by name, as they are printed."""
     return {
         "null_depth_db": errors.null_depth_db,
         "spectral_convergence": distance.convergence,

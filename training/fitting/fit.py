@@ -543,7 +543,10 @@ def _optimiser(model: StringModel[Any], recipe: Recipe) -> torch.optim.Optimizer
 
 
 def _keep_statistics(model: torch.nn.Module) -> None:
-    """Batch norm divides by what it has stored: a batch of loud strings then differs from one of soft ones."""
+    """Let batch norm divide by its stored statistics, and leave them as they are.
+
+    A batch of loud strings then differs from one of soft ones.
+    """
     for module in model.modules():
         if isinstance(module, BatchNorm1d):
             module.eval()

@@ -200,11 +200,11 @@ def _smooth(hz: Array, decay: Array, weight: Array) -> tuple[tuple[float, ...], 
 def strung(
     physics: LearnedPhysics, kind: Kind, length_m: float | None = None, gauge_mm: float | None = None
 ) -> Strung:
-    """The string in a gauge.
+    """The string of a kind that has the sound's pitch, stiffness, decay and glide.
 
     Args:
-        length_m: of the sounding length; None: assumed.
-        gauge_mm: its diameter; None: assumed through the tension.
+        length_m: the sounding length; None: that of the kind.
+        gauge_mm: the diameter; None: what the tension of the kind asks for.
     """
     build = BUILDS[kind]
     f0 = physics.f0_hz
@@ -226,11 +226,11 @@ def strung(
     d1, d3 = _damping(physics, mass, length)
     position = pluck_place(physics)
     assumed.append(f"pluck at {position:.2f} or {1 - position:.2f} of the length: both sound alike")
-    # Σ η² q² of a triangle of height 1 at p is 1/(2 p (1 - p)) · 2/ℓ² · ℓ²/... = the mean square slope, twice
-    slope = 2 / (position * (1 - position) * length**2)  # Σ η² q² for a height of 1 m
+    # A triangle of height 1 m at p has the slopes 1/(p ℓ) and -1/((1 - p) ℓ), whose mean square is 1/(p (1 - p) ℓ²).
+    squares = 2 / (position * (1 - position) * length**2)  # Σ η² q², which is twice that
     wanted = 4 * physics.rise  # ΔT/T₀ at the height: the mean over a period is half, and of a frequency half of that
-    amplitude = math.sqrt(max(wanted, 1e-9) * 4 * tension / (modulus * area * slope))
-    low, high = 2e-4, 8e-3
+    amplitude = math.sqrt(max(wanted, 1e-9) * 4 * tension / (modulus * area * squares))  # ΔT = EA/4 Σ η² q²
+    low, high = 2e-4, 8e-3  # m, of plucks; beyond them the modulus gives way, while EI and so the stiffness stay
     if not low <= amplitude <= high:
         chosen = min(max(amplitude, low), high)
         effective = modulus * (amplitude / chosen) ** 2

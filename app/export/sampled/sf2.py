@@ -73,7 +73,8 @@ def check_sf2(plan: SampledPlan) -> None:
     low, high = RATE_RANGE_HZ
     if not low <= plan.rate_hz <= high:
         raise ValueError(f"a SoundFont's rate must lie in {low} … {high} Hz, not {plan.rate_hz}; lower it")
-    if plan.largest_bytes > LARGEST_BYTES:  # no table is too long: 128 keys of 32 layers have 8,192 zones of 5 rows
+    # No table outgrows its 16-bit index: 128 keys of 32 layers in stereo are 8,192 zones of 5 rows at most.
+    if plan.largest_bytes > LARGEST_BYTES:
         raise ValueError(
             f"these samples may take {plan.largest_bytes / 2**30:.1f} GiB, and a SoundFont holds 4; "
             "take fewer keys, layers or seconds, or SFZ"

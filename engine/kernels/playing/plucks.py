@@ -93,7 +93,7 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
                 place -= turn
         if mode <= modes:
             player.amplitudes[mode - 1] = amplitude
-    highest = max(player.pulled[low:high].max(), 0.0)
+    highest = max(player.pulled[low:high].max(), 0.0)  # above 0 where the force pulls; the ends are at 0
     for mode in range(modes):
         player.amplitudes[mode] *= peak_m / highest
 
