@@ -67,10 +67,12 @@ def threads_begun() -> Iterator[Callable[[], list[str]]]:
 
 @pytest.fixture(scope="session", autouse=True)
 def imports_are_frozen() -> Iterator[None]:
-    """A look at all of torch takes a quarter of a second: what modules hold is no garbage."""
+    """A look at all of torch takes a quarter of a second: what modules hold is no garbage, also when the app ends."""
     gc.collect()
     gc.freeze()
-    yield
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("app.window.main.collect_anywhere", gc.enable)
+        yield
     gc.unfreeze()
 
 
