@@ -324,8 +324,7 @@ class Instrument(Value):
     level_db: float = parameter("level_db")
     macros: Annotated[tuple[Macro, ...], Field(max_length=MOST_MACROS)] = ()
 
-    @model_validator(mode="after")
-    def _strings_fit(self) -> Self:
+    def _check_strings(self) -> None:
         """Raise ValueError: bridge edge or course do not fit the strings, or drums, or each other."""
         has_edge = self.javari.distance_mm > 0
         if has_edge and isinstance(self.strings, Drums):
@@ -338,19 +337,29 @@ class Instrument(Value):
         count = len(self.strings.strings) if isinstance(self.strings, StringSet) else 0
         if self.course.octaves > count:
             raise ValueError(f"course.octaves: {self.course.octaves} is above the number of open strings, {count}")
-        return self
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
-        """Raise ValueError: the range is reversed, or wheel or macros turn what they cannot, or too far."""
+        """Raise ValueError: see the checks; also the range is reversed, or the wheel turns what it cannot."""
+        self._check_strings()
         low, high = self.range
         if low > high:
             raise ValueError(f"range: the lowest key {low} is above the highest, {high}; exchange them")
         if self.mod_wheel not in ("none", *WHEEL):
             fault = f"{bounds.brief(self.mod_wheel)} is no field that the wheel can turn"
             raise ValueError(f"mod_wheel: {fault}; try none, {', '.join(WHEEL)}")
+        self._check_macros()
+        return self
+
+    def _check_macros(self, part: str = "") -> None:
+        """Raise ValueError if macros turn what they cannot, or too far; `part`: look at what they turn of this alone.
+
+        Which values are allowed depends on others of the same part.
+        """
         for number, macro in enumerate(self.macros):
             for target in macro.targets:
+                if part not in ("", target.field.partition(".")[0]):
+                    continue
                 where = f"macros.{number}: target {target.field[:LONGEST_NAME]}"
                 self._check_assignable(where, target.field)
                 for value in (target.low, target.high):
@@ -358,7 +367,6 @@ class Instrument(Value):
                         self._replacement(target.field, value)
                     except ValueError as error:
                         raise ValueError(f"{where}: {explained(error)}") from error
-        return self
 
     def has(self, field: str) -> bool:
         """Return True if it has a parameter by this id; instruments in mono lack the second point."""
@@ -383,8 +391,10 @@ class Instrument(Value):
         instrument = self
         for field, value in values.items():
             self._check_assignable("field", field)
-            name, replacement = instrument._replacement(field, value)
-            instrument = Instrument.model_validate({**dict(instrument), name: replacement})
+            part, replacement = instrument._replacement(field, value)
+            instrument = instrument.model_copy(update={part: replacement})
+            instrument._check_strings()
+            instrument._check_macros(part)
         return instrument
 
     def with_knob(self, field: str, value: float) -> Instrument:

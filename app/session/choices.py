@@ -137,11 +137,14 @@ class Choices(Monitor):
             changes["pluck"] = asdict(changes.get("pluck", self.pluck)) | plucked
         if unknown := changes.keys() - Choices.model_fields.keys():
             raise ValueError(f"unknown field {bounds.brief(unknown.pop())}")
+        instrument = changes.get("instrument")
+        valid = {"instrument": instrument} if isinstance(instrument, Instrument) else {}
+        unchecked = {name: value for name, value in changes.items() if name not in valid}
         try:  # with `a`, `b` and `single` they are not taken for choices of earlier versions
-            checked = Choices.model_validate({"a": self.a, "b": self.b, "single": self.single, **changes})
+            checked = Choices.model_validate({"a": self.a, "b": self.b, "single": self.single, **unchecked})
         except ValidationError as error:
             raise ValueError(explained(error)) from error
-        choices = self.model_copy(update={name: getattr(checked, name) for name in changes})
+        choices = self.model_copy(update=valid | {name: getattr(checked, name) for name in unchecked})
         if choices.preset != self.preset and "string" not in changes:
             choices = choices.model_copy(update={"string": None})
         if self.plays_instrument and not choices.plays_instrument and "string_pickup" not in changes:

@@ -241,7 +241,8 @@ def changed_names(before: Stage, after: Stage) -> frozenset[str]:
         return frozenset()
     differs = [name for name in NAMES[len(OBSERVED) :] if getattr(before, name) is not getattr(after, name)]
     if after.choices is not before.choices:
-        differs += [name for name in OBSERVED if before.choices.value(name) != after.choices.value(name)]
+        pairs = ((name, before.choices.value(name), after.choices.value(name)) for name in OBSERVED)
+        differs += [name for name, value, other in pairs if value is not other and value != other]
     return frozenset(differs)
 
 

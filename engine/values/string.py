@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from operator import attrgetter
 
 from engine import bounds
 from engine.kernels import strings as law
@@ -47,7 +48,7 @@ class StringParameters:
     @property
     def row(self) -> tuple[float, ...]:
         """The parameters in their order, as the laws of `engine.kernels.strings` take them."""
-        return tuple(getattr(self, field.name) for field in fields(self))
+        return _VALUES(self)
 
     @property
     def pitch_hz(self) -> float:
@@ -101,6 +102,9 @@ class StringParameters:
             )
         if modes * min(modes, substeps) > bounds.MOST_FLOWS:
             raise ValueError(f"{modes} modes with {substeps} sub-steps of the truth are too many; keep fewer modes")
+
+
+_VALUES = attrgetter(*(field.name for field in fields(StringParameters)))
 
 
 @dataclass(frozen=True)

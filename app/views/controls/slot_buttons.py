@@ -10,6 +10,7 @@ from PySide6.QtGui import QAction, QActionGroup, QFontMetrics
 from PySide6.QtWidgets import QButtonGroup, QGridLayout, QMenu, QPushButton, QSizePolicy, QToolButton, QWidget
 
 from app.session.choices import Choices
+from app.session.monitor import Monitor
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from app.views import theme
 from app.views.controls.parts import push_button, show_kind, tool_button
@@ -60,7 +61,7 @@ class SlotButtons(QWidget):
             self._buttons[slot] = button
             grid.addWidget(button, row, 0)
             grid.addWidget(self._menu_button(slot), row, 1)
-        self.show_choices(self._choices)
+        self._show()
 
     def set_entries(self, entries: Sequence[PresetEntry]) -> None:
         self._entries = entries
@@ -74,8 +75,10 @@ class SlotButtons(QWidget):
         self._show()
 
     def show_choices(self, choices: Choices) -> None:
-        self._choices = choices
-        self._show()
+        """Show what the slots hold, and which is heard."""
+        before, self._choices = self._choices, choices
+        if any(getattr(before, name) != getattr(choices, name) for name in Monitor.model_fields):
+            self._show()
 
     def show_gains(self, gains_db: dict[str, float | None]) -> None:
         """Show the gain in dB with which each slot is heard; None: not known yet."""

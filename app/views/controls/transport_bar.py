@@ -51,6 +51,7 @@ class TransportBar(QFrame):
         self._fitted = (False, False, 1.0)  # compact, tight, scale of text
         self._tight, self._verb = False, ""  # symbols in place of words; "Pluck" or "Strike"
         self._groups: list[QHBoxLayout] = []  # rows of controls, each behind a rule
+        self._shown: object = None  # the choices that are shown, without the slots; None: none are
         self._playing: bool | None = None  # as shown; None after a click, which checks the button by itself
         self._row = row = filled(QHBoxLayout(self), spacing=5, margins=QMargins(12, 8, 12, 8))
         self.slots = SlotButtons()
@@ -103,8 +104,14 @@ class TransportBar(QFrame):
 
     def show_choices(self, choices: Choices) -> None:
         """Show the values on knobs, boxes and slots; disable those that have no effect with the present choices."""
+        self.slots.show_choices(choices)
+        values = {field: choices.value(field) for field in KNOBS}
+        shown = values, choices.pluck.shape, choices.loop, choices.pickup, choices.drums is None
+        if shown == self._shown:
+            return
+        self._shown = shown
         for field, knob in self.knobs.items():
-            knob.set_value(choices.value(field))
+            knob.set_value(values[field])
         self.knobs["width"].set_barred(NO_WIDTH if choices.pluck.shape == "triangular" else "")
         self._shape.setCurrentIndex(SHAPES.index(choices.pluck.shape))
         self._loop.setChecked(choices.loop)
@@ -118,7 +125,6 @@ class TransportBar(QFrame):
         for part in (*self.areas["pluck"], self._pickup, self._loop):
             part.setEnabled(choices.drums is None)  # they are of a string
         self._show_verb("Pluck" if choices.drums is None else "Strike")
-        self.slots.show_choices(choices)
 
     def show_trained(self, why_not: str) -> None:
         """Let the string be plucked as trained; `why_not`: the reason why it cannot be, or ""."""

@@ -85,6 +85,8 @@ class InstrumentBar(ChoiceBar):
         self._macros: tuple[Macro, ...] = ()  # of the instrument that is shown
         # compact: little width; tight: even less, which is compact too; tuned: by a Scala scale or keyboard mapping
         self._compact = self._tight = self._tuned = False
+        self._words: tuple[object, ...] = ()  # what is shown by `_show_words`; empty: nothing is
+        self._comparing = False  # whether keys play the instrument as it was saved
         self._shows_macros = True  # False: all knobs of the string are shown in their place
         self.knobs = {field: Knob(OF_INSTRUMENTS[field], width=NARROW_WIDTH, low=True) for field in MIXES}
         for field, knob in self.knobs.items():
@@ -201,7 +203,7 @@ class InstrumentBar(ChoiceBar):
         fits: dict[QToolButton | QLabel, bool] = {
             self.rename: not self._tight,
             self.revert: not self._tight,
-            self.compare: not self._tight or self.compare.isChecked(),
+            self.compare: not self._tight or self._comparing,
             self.category: not close,
             self.scale: self._tuned or not self._tight,
             self.takes_button: not self._tight,
@@ -222,6 +224,20 @@ class InstrumentBar(ChoiceBar):
 
     def show_instrument(self, instrument: Instrument, own: bool, changed: bool = False) -> None:
         """Show an instrument; `own`: it is the user's and can be renamed; `changed`: it differs from its file."""
+        words = instrument.name, instrument.description, instrument.category, own, changed, instrument.tuning
+        if words != self._words:
+            self._words = words
+            self._show_words(instrument, own, changed)
+        self._show_macros(instrument.macros)
+        for field, knob in self.knobs.items():
+            knob.set_value(instrument.value(field))
+        self.knobs["amp.tone_db"].setEnabled(instrument.amp.drive_db > 0)
+        self.knobs["body.mix"].setEnabled(bool(instrument.body.name))
+        if self.body.currentData() != instrument.body.name:
+            self._show_body(instrument.body.name)
+
+    def _show_words(self, instrument: Instrument, own: bool, changed: bool) -> None:
+        """Show name, category and tuning of an instrument, and what can be done with it; see `show_instrument`."""
         self.show_name(instrument.name, *(("●  ", ", changed") if changed else ()))
         tip = f"{instrument.name}{' (changed)' if changed else ''}\n{instrument.description}".strip()
         self.name.setToolTip(plain_tip(f"{tip}\nClick to browse the instruments"))
@@ -229,19 +245,15 @@ class InstrumentBar(ChoiceBar):
         for button in (self.save, self.revert, self.compare):
             button.setEnabled(changed)
         self.rename.setEnabled(own)
-        self._show_macros(instrument.macros)
         self._show_scale(instrument.tuning)
         self._share_width()
-        for field, knob in self.knobs.items():
-            knob.set_value(instrument.value(field))
-        self.knobs["amp.tone_db"].setEnabled(instrument.amp.drive_db > 0)
-        self.knobs["body.mix"].setEnabled(bool(instrument.body.name))
-        self._show_body(instrument.body.name)
 
     def show_comparing(self, comparing: bool) -> None:
         """Show if keys play the instrument as it was saved."""
-        self.compare.setChecked(comparing)
-        self._share_width()
+        if comparing != self._comparing:
+            self._comparing = comparing
+            self.compare.setChecked(comparing)
+            self._share_width()
 
     def show_macros(self, shown: bool) -> None:
         """Show the macros; else, with all knobs of the string, what they turn: the mixes of body and room."""
@@ -250,13 +262,14 @@ class InstrumentBar(ChoiceBar):
 
     def _show_macros(self, macros: tuple[Macro, ...]) -> None:
         """Show the values of macros on their knobs; names and tooltips only where these differ from before."""
-        for number, (knob, macro) in enumerate(zip(self.macros, macros, strict=False)):
-            if number >= len(self._macros) or _named(self._macros[number]) != _named(macro):
-                knob.set_name(macro.name, f"{macro.name}: changes {', '.join(_named(macro)[1])}")
+        before, self._macros = self._macros, macros
+        for knob, macro in zip(self.macros, macros, strict=False):
             knob.set_value(macro.value)
-        self._macros = macros
-        self._share_knobs()
-        self._share_width()
+        if _names(before) != (names := _names(macros)):
+            for knob, (name, turned) in zip(self.macros, names, strict=False):
+                knob.set_name(name, f"{name}: changes {', '.join(turned)}")
+            self._share_knobs()
+            self._share_width()
 
     def _share_knobs(self) -> None:
         """Show one knob for every value: of a mix that is a macro's only target, the macro's, while macros are shown.
@@ -350,6 +363,6 @@ def _scale_name(scale: str) -> str:
     return one_line(next(lines, ""), LONGEST_SCALE_NAME)
 
 
-def _named(macro: Macro) -> tuple[str, list[str]]:
-    """The name of a macro, and those of the parameters that it turns."""
-    return macro.name, [OF_INSTRUMENTS[target.field].name for target in macro.targets]
+def _names(macros: tuple[Macro, ...]) -> list[tuple[str, list[str]]]:
+    """The names of macros, each with those of the parameters that it turns."""
+    return [(macro.name, [OF_INSTRUMENTS[target.field].name for target in macro.targets]) for macro in macros]

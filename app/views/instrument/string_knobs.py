@@ -93,6 +93,7 @@ class StringKnobs(QWidget):
         self.knobs: dict[str, Knob] = {}
         self.shape = shape_box(lambda shape: self.changed.emit("pluck.shape", shape))
         self.facts = Facts()
+        self._saved: Instrument | None = None  # the values that a double-click resets to
         row = filled(QHBoxLayout(), spacing=5)
         for number, group in enumerate(GROUPS):
             filled(row, *([vertical_rule()] if number else []), self._group(group))
@@ -137,8 +138,9 @@ class StringKnobs(QWidget):
             value = instrument.value(field)
             knob.set_barred(_why_barred(instrument, field))
             knob.set_value(value)
-            if saved is not None:
+            if saved is not None and saved is not self._saved:
                 knob.default = saved.value(field)
+        self._saved = saved
         self.shape.setCurrentIndex(SHAPES.index(instrument.pluck.shape))
         barred = _why_barred(instrument, "pluck.shape")
         self.shape.setEnabled(not barred)
