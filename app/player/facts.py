@@ -20,6 +20,7 @@ from engine.pluck import Pluck
 from engine.presets import PresetInfo, outside_training
 from engine.presets.of_string import info_of_string
 from engine.resonators.family import BRIGHT_HZ, inharmonicity
+from engine.resonators.losses import loss_rate
 from engine.values.string import StringParameters
 
 HALVINGS = 40  # of a knob's range, until it stands at a wanted figure
@@ -46,7 +47,11 @@ def bright_mode(string: StringParameters) -> int:
 
 def t60_s(string: StringParameters, mode: int, instrument: Instrument) -> float:
     """The time in which a mode falls by 60 dB, by the string's own losses."""
-    return math.log(1000) / max(float(decay_rates(instrument, string, mode)[-1]), SLOWEST)
+    rate = string.decay_rate(mode)
+    if instrument.losses is not None:
+        knobs = instrument.knobs
+        rate += loss_rate(instrument.losses, string, mode, knobs.decay, knobs.brightness_decay)
+    return math.log(1000) / max(rate, SLOWEST)
 
 
 def by_two_numbers(instrument: Instrument, string: StringParameters) -> StringParameters:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.kernels.strings import loss
+from engine.kernels.strings import Mode, loss
 from engine.resonators.base import Array
 from engine.values.string import Losses, StringParameters
 
@@ -22,10 +22,15 @@ from engine.values.string import Losses, StringParameters
 def loss_rates(
     losses: Losses, string: StringParameters, partials: int, decay: float = 1.0, brightness_decay: float = 1.0
 ) -> Array:
-    """σ of each partial in 1/s, float64 (partials,), without d₁ and d₃.
+    """σ of each partial in 1/s, float64 (partials,), without d₁ and d₃; see `loss_rate`."""
+    return loss_rate(losses, string, np.arange(1.0, partials + 1), decay, brightness_decay)
+
+
+def loss_rate(losses: Losses, string: StringParameters, partial: Mode, decay: float, brightness_decay: float) -> Mode:
+    """σ of a partial in 1/s, or of each of an array, without d₁ and d₃.
 
     Args:
         decay, brightness_decay: factors of the losses to the air, and of those inside the string.
     """
     factors = decay * losses.air, brightness_decay * losses.friction, brightness_decay * losses.bending
-    return loss(string.row, np.arange(1.0, partials + 1), *factors)
+    return loss(string.row, partial, *factors)

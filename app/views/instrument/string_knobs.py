@@ -42,6 +42,7 @@ LETS_RING = "Release off (let ring)"
 
 GROUPS = (PITCH, STRING, DECAY, PLUCK)  # in the order of the strip; the pick-up is in the transport bar
 SHAPED = ("pluck.width", "pluck.width_hard")
+BARRING = ("strings", "pluck", "damping", "tuning")  # parts of an instrument that may bar knobs
 
 
 class Facts(QWidget):
@@ -93,7 +94,7 @@ class StringKnobs(QWidget):
         self.knobs: dict[str, Knob] = {}
         self.shape = shape_box(lambda shape: self.changed.emit("pluck.shape", shape))
         self.facts = Facts()
-        self._saved: Instrument | None = None  # the values that a double-click resets to
+        self._shown: tuple[Instrument | None, Instrument | None] = None, None  # as of `show_instrument`
         row = filled(QHBoxLayout(), spacing=5)
         for number, group in enumerate(GROUPS):
             filled(row, *([vertical_rule()] if number else []), self._group(group))
@@ -134,17 +135,19 @@ class StringKnobs(QWidget):
 
     def show_instrument(self, instrument: Instrument, saved: Instrument | None = None) -> None:
         """Show the values of an instrument; `saved`: those that a double-click resets to."""
+        before, self._shown = self._shown, (instrument, saved)
         for field, knob in self.knobs.items():
-            value = instrument.value(field)
-            knob.set_barred(_why_barred(instrument, field))
-            knob.set_value(value)
-            if saved is not None and saved is not self._saved:
+            knob.set_value(instrument.value(field))
+        if saved is not None and saved is not before[1]:
+            for field, knob in self.knobs.items():
                 knob.default = saved.value(field)
-        self._saved = saved
-        self.shape.setCurrentIndex(SHAPES.index(instrument.pluck.shape))
-        barred = _why_barred(instrument, "pluck.shape")
-        self.shape.setEnabled(not barred)
-        self.shape.setToolTip(barred or SHAPE_TIP)
+        if before[0] is None or any(getattr(before[0], part) is not getattr(instrument, part) for part in BARRING):
+            for field, knob in self.knobs.items():
+                knob.set_barred(_why_barred(instrument, field))
+            self.shape.setCurrentIndex(SHAPES.index(instrument.pluck.shape))
+            barred = _why_barred(instrument, "pluck.shape")
+            self.shape.setEnabled(not barred)
+            self.shape.setToolTip(barred or SHAPE_TIP)
 
     def show_figures(self, figures: Mapping[str, str]) -> None:
         """Show the figures that knobs amount to in that string, by field ("knobs.tension": "72.3 N").
