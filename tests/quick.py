@@ -30,9 +30,15 @@ def changed_files() -> list[Path]:
     return [path for path in sorted({ROOT / name for name in names}) if path.suffix == ".py" and path.is_file()]
 
 
+def _text_of(test: Path) -> str:
+    """The text of a test and of the table beside it, as `calls.txt` of `test_calls.py`."""
+    table = test.with_name(f"{test.stem.removeprefix('test_')}.txt")
+    return test.read_text("utf-8") + (table.read_text("utf-8") if table.is_file() else "")
+
+
 def nearest_tests(changed: list[Path]) -> list[Path]:
     """Test files in the order of their nearness to changed files."""
-    tests = {path: path.read_text("utf-8") for path in sorted(ROOT.glob("tests/**/test_*.py"))}
+    tests = {path: _text_of(path) for path in sorted(ROOT.glob("tests/**/test_*.py"))}
     modules = [path.relative_to(ROOT).with_suffix("") for path in changed]
     modules = [module for module in modules if module.parts[0] in PRODUCT]
     mirrors = [ROOT / "tests" / module.parent / f"test_{module.name}.py" for module in modules]
