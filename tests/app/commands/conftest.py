@@ -1,11 +1,13 @@
 """Command lines in this process, and the files that they read: each is made when a line names it."""
 
+import gc
 import json
 import math
 import shutil
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +15,7 @@ import numpy as np
 import pytest
 import soundfile
 import torch
+import typer
 
 from app.commands.cli import main
 from app.export.recipe import SoundRecipe
@@ -66,6 +69,16 @@ BYTES = {
 }
 
 
+@pytest.fixture(autouse=True)
+def later_imports_are_frozen() -> Iterator[None]:
+    """Training brings 800 modules of torch's compiler; as no window is here, all that is left is kept for good."""
+    known = len(sys.modules)
+    yield
+    if len(sys.modules) > known:
+        gc.collect()
+        gc.freeze()
+
+
 class Outcome(NamedTuple):
     """What a command line did."""
 
@@ -89,13 +102,16 @@ class Outcome(NamedTuple):
 
 Run = Callable[..., Outcome]
 
+get_command = cache(typer.main.get_command)  # reads every signature, for a twentieth of a second
+
 
 @pytest.fixture
 def run(request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
     """Run a command line in this process, and more words; a name in its braces is a fixture's.
 
-    Lines of progress come only after an hour.
+    Lines of progress come only after an hour. The parser is built once, as in a process.
     """
+    monkeypatch.setattr(typer.main, "get_command", get_command)
     monkeypatch.setattr(console, "bars", partial(console.bars, 3600.0))
 
     class Fixtures(dict[str, Any]):
