@@ -15,7 +15,9 @@ def synthetic() -> SyntheticNote:
 
 
 @pytest.fixture(scope="session")
-def learned(synthetic: SyntheticNote) -> Learned:
-    source = Source("note.wav", "0" * 64, synthetic.rate_hz, 80_000)
-    found = examined(synthetic.samples[:80_000], synthetic.rate_hz)
+def learned() -> Learned:
+    """A short note of 317 Hz, which has few partials to fit."""
+    made = synthetic_note(4, seconds=0.8)
+    source = Source("note.wav", "0" * 64, made.rate_hz, len(made.samples))
+    found = examined(made.samples, made.rate_hz)
     return learn([(found, source)], kind="guitar", length_m=0.65)[0]
