@@ -107,7 +107,7 @@ def test_intervals_of_random_strings_hold_the_truth_and_are_narrow():
     """Strings with a body, noise and a second polarisation; `bench recordings --synthetic 200` is the whole of it."""
     held, widths = [], []
     for seed in (11, 3_002):
-        made = synthetic_note(seed, seconds=1.6)
+        made = synthetic_note(seed, seconds=1.2)
         note = note_of(made.samples, made.rate_hz)
         series = number_note(note)
         assert series is not None
