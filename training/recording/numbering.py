@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -90,10 +91,16 @@ class Peaks:
     highest_hz: float
     hidden_hz: Array = field(default_factory=lambda: np.zeros(0))  # where a peak would not be seen
 
-    @property
+    @cached_property
     def strength(self) -> Array:
         """The strength of each peak, from 0 for one that barely stands out to 1."""
         return np.clip((self.above_db - PRESENT_DB / 2) / (FULL_DB - PRESENT_DB / 2), 0.0, 1.0)
+
+    @cached_property
+    def weight(self) -> Array:
+        """The weight of each peak, (peaks,): its strength, less for a soft one."""
+        loudness = np.clip((self.level_db - self.level_db.max() + 60) / 60, 0.0, 1.0)
+        return np.asarray(self.strength * (0.3 + 0.7 * loudness), np.float64)
 
     @property
     def power(self) -> Array:
@@ -219,11 +226,8 @@ def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> PartialSeries:
     k_of = nearest(peaks.hz, f0_hz, stiffness).astype(int)
     target = partial_hz(k_of, f0_hz, stiffness)
     allowed = tolerance(peaks.hz, f0_hz, peaks.width_hz)
-    near = np.clip(1.5 * (1 - np.abs(peaks.hz - target) / allowed), 0.0, 1.0)
-    inside = (near > 0) & (k_of <= MOST_PARTIALS)
-    strength = peaks.strength
-    loudness = np.clip((peaks.level_db - peaks.level_db.max() + 60) / 60, 0.0, 1.0)
-    weight = strength * (0.3 + 0.7 * loudness)
+    near = np.minimum(np.maximum(1.5 * (1 - np.abs(peaks.hz - target) / allowed), 0.0), 1.0)
+    inside, weight = (near > 0) & (k_of <= MOST_PARTIALS), peaks.weight
     best = np.zeros(MOST_PARTIALS + 1)  # by number of partial: weight of the peak that is its
     np.maximum.at(best, k_of[inside], (near * weight)[inside])
     present = np.flatnonzero(best > 0.02)
