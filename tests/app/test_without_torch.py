@@ -42,6 +42,7 @@ def alive(controller):
             panel = {panel.key: panel for panel in controller.panels}[view]
             if not views and panel.columns() is not None:
                 loaded.append("torch" in sys.modules)
+                panel.background.cancel()  # finer errors
                 controller.presets.browser.show_over()
             elif view == "spectrum" or panel.columns() is not None:
                 controller.session.update(left_view=views.pop())
@@ -70,9 +71,8 @@ assert len(linecache.cache) < 100  # sources of modules, which PySide would keep
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there torch must come before Qt")
 def test_an_instrument_is_rendered_and_the_window_plays_keys_and_draws_their_strings(tmp_path):
-    settings = {"QT_QPA_PLATFORM": "offscreen", "LEARNED_STRINGS_SETTINGS": str(tmp_path / "s.json")}
+    (path := tmp_path / "s.json").write_text('{"choices": {"seconds": 0.5}}')  # each note is drawn to its end
+    environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "LEARNED_STRINGS_SETTINGS": str(path)}
     command = [sys.executable, "-c", SCRIPT]
-    done = subprocess.run(
-        command, cwd=ROOT, env={**os.environ, **settings}, capture_output=True, text=True, timeout=300
-    )
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
