@@ -216,7 +216,7 @@ Samples = tuple[np.ndarray, int]
 @pytest.fixture(scope="module")
 def note(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("note") / "Low string.wav"
-    made = synthetic_note(2, seconds=1.0)
+    made = synthetic_note(2, seconds=0.6, highest_hz=600.0)
     soundfile.write(path, made.samples, made.rate_hz, "FLOAT")
     return path
 
