@@ -66,14 +66,19 @@ def threads_begun() -> Iterator[Callable[[], list[str]]]:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def imports_are_frozen() -> Iterator[None]:
-    """A look at all of torch takes a quarter of a second: what modules hold is no garbage, also when the app ends."""
-    gc.collect()
-    gc.freeze()
+def frozen_to_the_end() -> Iterator[None]:
+    """The end of an app unfreezes nothing."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("app.window.main.collect_anywhere", gc.enable)
         yield
     gc.unfreeze()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def kept_is_frozen() -> None:
+    """A look at all of torch takes a quarter of a second: what is left by the tests before is no garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)
