@@ -23,7 +23,6 @@ from tests.app.player.stage import PRESET, RATE_HZ, pitch_hz, play, relative
 KIT, TOM, TIMPANI = (
     read_instrument(INSTRUMENTS / f"{name}.json") for name in ("concert_toms", "tuned_toms", "timpani")
 )
-DRY_KIT = KIT.with_value("room.mix", 0.0)
 HARD = Mallet(mass_kg=0.015, radius_m=0.002, contact_s=0.0005)
 LARGEST_STEP = 2e-5  # twice: a step is then 100 dB below full scale
 

@@ -29,7 +29,6 @@ from tests.engine.resonators.test_recorded import recorded
 GAINS = {"model": 1.0, "truth": -0.5}
 CLOSE = 1e-7
 Played = Sequence[tuple[int, Event]]
-Gains = dict[str, float]
 FROZEN_INSTRUMENTS = Path(__file__).parent / "frozen"
 FROZEN = json.loads((FROZEN_INSTRUMENTS / "sounds.json").read_text())
 

@@ -11,29 +11,6 @@ REACH = PluckRange((0.3, 0.7), (1.0, 10.0))
 EVERY_OCTAVE = range(keyboard.LOWEST_OCTAVE, keyboard.HIGHEST_OCTAVE + 1)
 
 
-def test_rows_of_keys_are_places_and_a_piano():
-    assert [keyboard.place_of(KeyPress(letter), "darwin") for letter in "ASDFGHJKL;"] == list(range(10))
-    assert REACH.row == pytest.approx([0.3 + 0.4 * i / 9 for i in range(10)], abs=5e-5)
-    assert [keyboard.semitone_of(KeyPress(letter), "darwin") for letter in "AWSEDFTGYHUJKOLP;'"] == list(range(18))
-    assert keyboard.letters_of(1)[LOWEST_C + 12] == "A"
-
-
-def test_keys_are_known_by_their_place():
-    for platform, press, place, semitone in (
-        ("linux", KeyPress("Q", 38), 0, 0),  # AZERTY: Q is where A is elsewhere
-        ("linux", KeyPress("A", 24), None, None),
-        ("linux", KeyPress("z", 25), None, 1),
-        ("linux", KeyPress("", 47), 9, 16),  # ö
-        ("linux", KeyPress("", 48), None, 17),
-        ("win32", KeyPress("Q", 0x1E), 0, 0),
-        ("darwin", KeyPress("d", 2), 2, 4),  # its codes are not reported: the letter counts
-        ("darwin", KeyPress("Q"), None, None),
-        ("linux", KeyPress("q"), None, None),
-        ("linux", KeyPress(""), None, None),
-    ):
-        assert (keyboard.place_of(press, platform), keyboard.semitone_of(press, platform)) == (place, semitone), press
-
-
 def test_digits_and_c_and_v_set_the_amplitude_and_others_nothing():
     levels = [REACH.turned(KeyPress(digit), 4.0) or 0.0 for digit in "123456789"]
     assert levels == sorted(levels) and (levels[0], levels[-1]) == pytest.approx((1.0, 10.0))
@@ -62,15 +39,6 @@ def test_reach_is_what_a_preset_was_trained_on(small_preset):
     assert PluckRange.of(nylon) == PluckRange((0.06, 0.94), (0.5, 10.0))
     low_mm, high_mm = PluckRange.of(harp).amplitude_mm
     assert low_mm == 0.5 and harp.tension_rise(Pluck(amplitude_mm=high_mm)) == pytest.approx(0.5)
-
-
-def test_octave_and_velocity_keys_stay_within_bounds():
-    highest, lowest = keyboard.HIGHEST_OCTAVE, keyboard.LOWEST_OCTAVE
-    assert keyboard.turn(KeyPress("z"), 0, 90) == (-1, 90)
-    assert keyboard.turn(KeyPress("X"), highest, 90) == (highest, 90)
-    assert keyboard.turn(KeyPress("Z"), lowest, 90) == (lowest, 90)
-    velocities = [keyboard.turn(KeyPress(key), 0, v) for key, v in (("9", 90), ("1", 90), ("v", 120), ("c", 5))]
-    assert velocities == [(0, 127), (0, 1), (0, 127), (0, 1)] and keyboard.turn(KeyPress("m"), 0, 5) is None
 
 
 def test_octaves_are_those_in_which_a_key_sounds_and_the_nearest_has_most_keys():

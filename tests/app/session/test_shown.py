@@ -1,6 +1,5 @@
 """The sound of two slots: voices, levels, the words in which it is shown, and why it is silent."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -41,17 +40,6 @@ B = "preset:b"
 )
 def test_gains_of_what_is_heard(monitor, match, gains):
     assert {source: monitor.gain(source, gains.keys(), match) for source in gains} == pytest.approx(gains)
-
-
-def test_slots_get_voices_and_gains_are_shown_once_they_are_known():
-    assert Monitor().voices == ("model", "truth")
-    assert Monitor(heard="b").voices == ("truth", "model")
-    assert Monitor(a="difference", b=B).voices == ("model", "truth", B)
-    assert Monitor(a=B, b=B).voices == (B,)
-    assert Monitor(level_match=False).gain_db("a", None) == 0
-    assert Monitor().gain_db("a", None) is None
-    assert Monitor().gain_db("a", MATCH) == pytest.approx(20 * math.log10(2))
-    assert Monitor(b="difference", difference_gain_db=12.0).gain_db("b", None) == 12
 
 
 def test_each_slot_is_reported_with_its_title_and_gain_and_one_source_once(small_preset):

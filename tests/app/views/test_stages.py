@@ -7,7 +7,6 @@ import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QColor
 
-from app.analysis.moment import StringFrame
 from app.session.shown import DEFAULT_SOURCES
 from app.views import theme
 from app.views.drum.axes import HeadAxes
@@ -53,13 +52,6 @@ def view(show: Callable[..., StringView]) -> StringView:
 @pytest.fixture
 def plucks(view: StringView) -> list[tuple[float, float]]:
     return reported(view.pluck_drawn)
-
-
-def frame_of(mm: float = 0.0, **other_mm: float) -> StringFrame:
-    """A moment of a string in its first shape, or of two."""
-    shape = np.sin(np.pi * np.linspace(0, 1, 101)).astype(np.float32)
-    shapes = {"model": mm * shape, **{name: (mm + by) * shape for name, by in other_mm.items()}}
-    return StringFrame(shapes, {name: (shape, shape) for name, shape in shapes.items()})
 
 
 def test_axes_go_to_pixels_and_back():

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -29,7 +28,6 @@ from tests.app.window.driver import KEY, LEFT, PLAIN, by_arrows, find, fits, nam
 
 ROOT = Path(__file__).parents[3]
 COPY = Qt.DropAction.CopyAction
-Theme = Callable[..., None]
 
 
 def test_the_window_shows_without_the_engine(qtbot, monkeypatch):

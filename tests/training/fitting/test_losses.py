@@ -154,7 +154,6 @@ def test_vectors_take_adams_step_and_weights_decay_and_no_gradient_changes_nothi
 
 CPU = torch.device("cpu")
 MODELS = ("koopman", "koopman_var", "lru", "s5", "fgru", "frnn")
-EVERY_FRAME = Recipe(epochs=1, steps_per_batch=0, flip=False, koopman_terms="published")
 
 
 @pytest.mark.parametrize(

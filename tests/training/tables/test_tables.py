@@ -16,8 +16,6 @@ from training.tables.paper import (
 )
 from training.tables.tidy_csv import as_csv
 
-G4 = DatasetColumn("gaussian", 4000)
-
 
 def row(cell: Cell | None = None, mse: float | None = 0.01, mae: float | None = 0.1, **changes: Any) -> Row:
     """A row as a run of the cell makes it."""

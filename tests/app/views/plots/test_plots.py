@@ -25,7 +25,6 @@ from tests.app.gestures import CONTROL, LEFT, RIGHT, SHIFT, move, press_keys, re
 
 Key = Qt.Key
 Show = Callable[..., Any]
-TICKS = [(float(place), f"{place}") for place in range(11)]
 FIGURES = (FigureColumn("name", "name", "a name"), FigureColumn("level", "level", "in dB", lambda v: f"{v:.1f}"))
 
 
