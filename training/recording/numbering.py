@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from training.recording.note import Note
 F0_RANGE_HZ = (26.0, 4_300.0)
 STIFFNESSES = np.concatenate([[0.0], np.geomspace(5e-6, 2.5e-3, 22)])  # values of B that are tried
 COARSE = (0.0, 4e-5, 3e-4)  # values of B for the first choice among all f0
+MOST_TRIED = 40  # values of f0 that are tried with all STIFFNESSES
 MOST_PARTIALS = 80
 PRESENT_DB = 9.0  # above the local floor, for a peak that counts
 FULL_DB = 40.0  # above it a peak counts no more than at it
@@ -65,7 +66,7 @@ def apart_cents(first: PartialSeries, other: PartialSeries) -> float:
     return abs(1200 * math.log2(other.f0_hz / first.f0_hz))
 
 
-def partial_hz(k: Any, f0_hz: float, stiffness: float) -> Any:
+def partial_hz(k: Any, f0_hz: float | Array, stiffness: float | Array) -> Any:
     """The frequency of a stiff string's partial of number k, or of each of an array."""
     return k * f0_hz * np.sqrt(1 + stiffness * k**2)
 
@@ -130,15 +131,14 @@ def distances(hz: Array, f0_hz: float, stiffness: float) -> Array:
     return hz - partial_hz(nearest(hz, f0_hz, stiffness), f0_hz, stiffness)
 
 
-def nearest(hz: Array, f0_hz: float, stiffness: float) -> Array:
+def nearest(hz: Array, f0_hz: float | Array, stiffness: float | Array) -> Array:
     """The number, as a float, of the partial that is nearest to each frequency."""
-    square = (hz / f0_hz) ** 2
-    if stiffness >= 1e-12:
-        square = (np.sqrt(1 + 4 * stiffness * square) - 1) / (2 * stiffness)
+    square, curved = (hz / f0_hz) ** 2, np.maximum(stiffness, 1e-12)
+    square = np.where(stiffness >= curved, (np.sqrt(1 + 4 * curved * square) - 1) / (2 * curved), square)
     return np.maximum(1, np.round(np.sqrt(square)))
 
 
-def tolerance(hz: Array, f0_hz: float, width_hz: float) -> Array:
+def tolerance(hz: Array, f0_hz: float | Array, width_hz: float) -> Array:
     """The farthest that a peak may lie from its partial: the resolution, and a share of the frequency.
 
     It stays below the spacing.
@@ -181,16 +181,18 @@ def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Part
     if len(peaks.hz) == 0:
         return None
     candidates = _candidates(peaks, f0_range_hz)
-    scored = sorted(((max(series_at(peaks, f0, b).score for b in COARSE), f0) for f0 in candidates), reverse=True)
-    tried = (series_at(peaks, f0, float(stiffness)) for _, f0 in scored[:40] for stiffness in STIFFNESSES)
-    best = max(tried, key=lambda series: series.score, default=None)
-    return None if best is None else _best_refined(peaks, best)
+    if len(candidates) == 0:
+        return None
+    scores = scored(peaks, np.repeat(candidates, len(COARSE)), np.tile(COARSE, len(candidates))).score
+    chosen = candidates[np.lexsort((candidates, scores.reshape(-1, len(COARSE)).max(1)))[::-1][:MOST_TRIED]]
+    best = best_series(peaks, np.repeat(chosen, len(STIFFNESSES)), np.tile(STIFFNESSES, len(chosen)))
+    return _best_refined(peaks, best)
 
 
 def followed(peaks: Peaks, series: PartialSeries) -> PartialSeries:
     """The same string's series in other peaks of its note, where it may have glided."""
-    tried = (series_at(peaks, series.f0_hz * 2 ** (cents / 1200), series.stiffness) for cents in GLIDES_CENTS)
-    return _best_refined(peaks, max(tried, key=lambda candidate: candidate.score))
+    tried_hz = series.f0_hz * 2 ** (GLIDES_CENTS / 1200)
+    return _best_refined(peaks, best_series(peaks, tried_hz, np.full(len(tried_hz), series.stiffness)))
 
 
 def _best_refined(peaks: Peaks, series: PartialSeries) -> PartialSeries:
@@ -221,33 +223,54 @@ def _candidates(peaks: Peaks, f0_range_hz: tuple[float, float]) -> Array:
     return np.array(kept)
 
 
-def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> PartialSeries:
-    """A series of given f0 and B with its score."""
-    k_of = nearest(peaks.hz, f0_hz, stiffness).astype(int)
-    target = partial_hz(k_of, f0_hz, stiffness)
-    allowed = tolerance(peaks.hz, f0_hz, peaks.width_hz)
-    near = np.minimum(np.maximum(1.5 * (1 - np.abs(peaks.hz - target) / allowed), 0.0), 1.0)
-    inside, weight = (near > 0) & (k_of <= MOST_PARTIALS), peaks.weight
-    best = np.zeros(MOST_PARTIALS + 1)  # by number of partial: weight of the peak that is its
-    np.maximum.at(best, k_of[inside], (near * weight)[inside])
-    present = np.flatnonzero(best > 0.02)
-    if len(present) == 0:
-        return PartialSeries(f0_hz, stiffness, (), explained=0.0, missing=1.0, score=-1.0)
+class Scores(NamedTuple):
+    """The scores of series that are tried, (series,) each; see `PartialSeries`.
+
+    Attributes:
+        present: (series, MOST_PARTIALS + 1) by number of partial.
+    """
+
+    present: NDArray[np.bool_]
+    explained: Array
+    missing: Array
+    score: Array
+
+
+def scored(peaks: Peaks, f0_hz: Array, stiffness: Array) -> Scores:
+    """The scores of series of given f0 and B, (series,) each."""
+    f0, b, hz = f0_hz[:, None], stiffness[:, None], peaks.hz[None]
+    k_of = nearest(hz, f0, b).astype(int)
+    off = np.abs(hz - partial_hz(k_of, f0, b)) / tolerance(hz, f0, peaks.width_hz)
+    near = np.minimum(np.maximum(1.5 * (1 - off), 0.0), 1.0)
+    which, peak = np.nonzero((near > 0) & (k_of <= MOST_PARTIALS))
+    best = np.zeros((len(f0_hz), MOST_PARTIALS + 1))  # by number of partial: weight of the peak that is its
+    np.maximum.at(best, (which, k_of[which, peak]), near[which, peak] * peaks.weight[peak])
+    present, total = best > 0.02, best.sum(1)
     # predicted ones that are not there, up to where most of the series' strength lies: one peak is no series
-    share = np.cumsum(best) / best.sum()
-    last = int(np.searchsorted(share, 0.93))
-    count = max(last, min(HEARD, int(HEARD_HZ / f0_hz)), 1)
-    explained = float(best[: count + 1].sum() / max(weight.sum(), 1e-12))
-    absent = best[1 : count + 1] <= 0.02
+    last = (np.cumsum(best, 1) < 0.93 * total[:, None]).sum(1)
+    count = np.maximum(np.maximum(last, np.minimum(HEARD, HEARD_HZ // f0_hz)), 1)
+    counted = np.arange(MOST_PARTIALS + 1) <= count[:, None]
+    explained = np.where(counted, best, 0.0).sum(1) / max(peaks.weight.sum(), 1e-12)
+    absent = counted[:, 1:] & ~present[:, 1:]
     if len(peaks.hidden_hz):
         # near a partial of the other series nothing would be seen
-        expected = partials_hz(f0_hz, stiffness, count)
-        apart = np.abs(expected[:, None] - peaks.hidden_hz[None]).min(1)
-        absent &= apart > 1.5 * tolerance(expected, f0_hz, peaks.width_hz)
-    missing = float(absent.sum() / count)
-    first = 0.12 * float(absent[0])  # what a missing first partial costs
-    score = explained - MISSING * missing - first - 0.04 * (len(present) < 3)
-    return PartialSeries(f0_hz, stiffness, tuple(present.tolist()), explained, missing, score)
+        expected = partial_hz(np.arange(1.0, MOST_PARTIALS + 1), f0, b)
+        above = np.searchsorted(peaks.hidden_hz, expected).clip(1, len(peaks.hidden_hz) - 1)
+        apart = np.minimum(*(np.abs(expected - peaks.hidden_hz[above - side]) for side in (0, 1)))
+        absent &= apart > 1.5 * tolerance(expected, f0, peaks.width_hz)
+    missing = absent.sum(1) / count
+    first = 0.12 * absent[:, 0]  # what a missing first partial costs
+    score = explained - MISSING * missing - first - 0.04 * (present.sum(1) < 3)
+    return Scores(present, explained, missing, np.where(present.any(1), score, -1.0))
+
+
+def best_series(peaks: Peaks, f0_hz: Array, stiffness: Array) -> PartialSeries:
+    """The series that scores most, of given f0 and B, (series,) each; the first of equal ones."""
+    scores = scored(peaks, f0_hz, stiffness)
+    best = int(scores.score.argmax())
+    present = tuple(np.flatnonzero(scores.present[best]).tolist())
+    explained, missing, score = (float(of_series[best]) for of_series in scores[1:])
+    return PartialSeries(float(f0_hz[best]), float(stiffness[best]), present, explained, missing, score)
 
 
 def _refined(peaks: Peaks, series: PartialSeries) -> PartialSeries:
@@ -260,7 +283,7 @@ def _refined(peaks: Peaks, series: PartialSeries) -> PartialSeries:
     (square, slope), *_ = fit_law(k[used], peaks.hz[used], peaks.strength[used] + 0.05, 3)
     if square <= 0:
         return series
-    return series_at(peaks, float(np.sqrt(square)), float(max(0.0, slope / square)))
+    return best_series(peaks, np.sqrt([square]), np.maximum([slope / square], 0.0))
 
 
 def fit_law(k: Array, hz: Array, weight: Array, rounds: int) -> tuple[Array, Array, Array]:
