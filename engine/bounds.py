@@ -133,10 +133,11 @@ def check_all(value: Any, limits: Mapping[str, tuple[float, float]], of: str = "
 
     None passes where it is the default. `of` stands before the field's name in messages.
     """
-    defaults = {field.name: field.default for field in dataclasses.fields(value)}
     for name, low_high in limits.items():
         number = getattr(value, name)
-        if number is None and defaults[name] is None:
+        if number is None and any(
+            field.name == name and field.default is None for field in dataclasses.fields(value)
+        ):
             continue
         if number is None or isinstance(number, bool):
             raise ValueError(f"{of}{name} must be a number, not {number}")

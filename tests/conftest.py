@@ -20,7 +20,20 @@ from engine.voices.ear import REACH_FRAMES, differentiator_taps
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # windows need no screen, however pytest is started
 
+SLOWEST = (  # with tests of ten seconds: one that begins last would run alone
+    "test_figures.py",
+    "test_heard_in_the_lab.py",
+    "test_kills.py",
+    "test_learn.py",
+    "test_sweep.py",
+    "test_without_torch.py",
+)
 Derivative = Callable[[NDArray[np.floating], int], NDArray[np.float64]]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the slowest files."""
+    items.sort(key=lambda item: item.path.name not in SLOWEST)
 
 
 @pytest.fixture(scope="session")
