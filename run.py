@@ -261,9 +261,15 @@ def compile_kernels() -> None:
     say("the sound engine is ready")
 
 
+def kernel_sources() -> list[Path]:
+    """List the files whose functions are compiled, and those whose numbers are in their code."""
+    numbers = (ROOT / f"engine/{name}.py" for name in ("bounds", "levels", "parameters"))
+    return sorted([*ROOT.glob("engine/kernels/**/*.py"), *ROOT.glob("engine/*/_*kernel.py"), *numbers])
+
+
 def kernels() -> str:
     """Hash the compiled functions' sources, and what else .venv holds."""
-    sources = sorted([*ROOT.glob("engine/kernels/*.py"), *ROOT.glob("engine/*/_*kernel.py")])
+    sources = filter(Path.is_file, kernel_sources())
     return hashlib.sha256(b"\0".join([fingerprint().encode(), *(path.read_bytes() for path in sources)])).hexdigest()
 
 

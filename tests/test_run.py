@@ -16,6 +16,8 @@ from unittest.mock import Mock
 import pytest
 from packaging.specifiers import SpecifierSet
 
+from engine.kernels import cache
+
 SOURCE = Path(__file__).parents[1] / "run.py"
 
 
@@ -25,6 +27,10 @@ def load(path):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def test_all_sources_of_kernels_decide_whether_they_are_compiled_again():
+    assert {*cache._sources()} <= {*load(SOURCE).kernel_sources()}
 
 
 @pytest.fixture
