@@ -250,9 +250,9 @@ class InstrumentBar(ChoiceBar):
 
     def show_comparing(self, comparing: bool) -> None:
         """Show if keys play the instrument as it was saved."""
+        self.compare.setChecked(comparing)  # a click has checked it, though there may be nothing to compare with
         if comparing != self._comparing:
             self._comparing = comparing
-            self.compare.setChecked(comparing)
             self._share_width()
 
     def show_macros(self, shown: bool) -> None:

@@ -190,6 +190,8 @@ def test_an_instrument_is_saved_renamed_compared_and_deleted(guitar, monkeypatch
     instruments.delete("yours")
     assert not list(own_instruments().glob("*.json")) and "yours" not in instruments.favourites
     assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (True, False)
+    bar.compare.click()
+    assert heard() == (False, guitar.instrument), "there is nothing to compare with"
 
 
 def test_switches_of_the_strip_reach_the_keys_and_its_choices_the_instrument(guitar):
