@@ -133,8 +133,8 @@ def distances(hz: Array, f0_hz: float, stiffness: float) -> Array:
 
 def nearest(hz: Array, f0_hz: float | Array, stiffness: float | Array) -> Array:
     """The number, as a float, of the partial that is nearest to each frequency."""
-    square, curved = (hz / f0_hz) ** 2, np.maximum(stiffness, 1e-12)
-    square = np.where(stiffness >= curved, (np.sqrt(1 + 4 * curved * square) - 1) / (2 * curved), square)
+    square, stiff = (hz / f0_hz) ** 2, np.maximum(stiffness, 1e-12)
+    square = np.where(stiffness >= stiff, (np.sqrt(1 + 4 * stiff * square) - 1) / (2 * stiff), square)
     return np.maximum(1, np.round(np.sqrt(square)))
 
 
@@ -183,7 +183,7 @@ def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Part
     candidates = _candidates(peaks, f0_range_hz)
     if len(candidates) == 0:
         return None
-    scores = scored(peaks, np.repeat(candidates, len(COARSE)), np.tile(COARSE, len(candidates))).score
+    scores = scores_of(peaks, np.repeat(candidates, len(COARSE)), np.tile(COARSE, len(candidates))).score
     chosen = candidates[np.lexsort((candidates, scores.reshape(-1, len(COARSE)).max(1)))[::-1][:MOST_TRIED]]
     best = best_series(peaks, np.repeat(chosen, len(STIFFNESSES)), np.tile(STIFFNESSES, len(chosen)))
     return _best_refined(peaks, best)
@@ -236,7 +236,7 @@ class Scores(NamedTuple):
     score: Array
 
 
-def scored(peaks: Peaks, f0_hz: Array, stiffness: Array) -> Scores:
+def scores_of(peaks: Peaks, f0_hz: Array, stiffness: Array) -> Scores:
     """The scores of series of given f0 and B, (series,) each."""
     f0, b, hz = f0_hz[:, None], stiffness[:, None], peaks.hz[None]
     k_of = nearest(hz, f0, b).astype(int)
@@ -266,7 +266,7 @@ def scored(peaks: Peaks, f0_hz: Array, stiffness: Array) -> Scores:
 
 def best_series(peaks: Peaks, f0_hz: Array, stiffness: Array) -> PartialSeries:
     """The series that scores most, of given f0 and B, (series,) each; the first of equal ones."""
-    scores = scored(peaks, f0_hz, stiffness)
+    scores = scores_of(peaks, f0_hz, stiffness)
     best = int(scores.score.argmax())
     present = tuple(np.flatnonzero(scores.present[best]).tolist())
     explained, missing, score = (float(of_series[best]) for of_series in scores[1:])
