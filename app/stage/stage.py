@@ -83,7 +83,7 @@ Event = Chosen | Begun | Turned | Asked | Rendered | Parked
 
 @dataclass(frozen=True)
 class Stage:
-    """All that is chosen, played and shown.
+    """The present choices, note, motion and playhead, as one value.
 
     A motion is what a string or a drum does after a pluck or a blow, as it is drawn; the playhead is a time in it.
 

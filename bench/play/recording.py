@@ -113,7 +113,7 @@ class Recording:
         return True
 
     def sound(self) -> NDArray[np.float32]:
-        """All that is recorded so far, mapped from the file, shape (frames, channels)."""
+        """The sound recorded so far, mapped from the file, shape (frames, channels)."""
         frames = self._path.stat().st_size // FRAME_BYTES
         return np.memmap(self._path, np.float32, "r", shape=(frames, CHANNELS))
 

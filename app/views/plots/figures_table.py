@@ -138,7 +138,7 @@ class FiguresTable(QTableWidget):
         self.setCurrentIndex(QModelIndex())
 
     def text(self) -> str:
-        """All that is shown, sorted as it is: headings and rows, tabs between, to paste into a spreadsheet."""
+        """The shown rows, sorted as they are: headings and rows, tabs between, to paste into a spreadsheet."""
         lines = [[column.title for column in self._columns]]
         lines += [["" if value is None else f"{value}" for value in row.values] for row in self.rows]
         return "\n".join("\t".join(line) for line in lines) + "\n"

@@ -267,7 +267,7 @@ class ComputedPanel(Panel):
 
     @abstractmethod
     def _wanted(self) -> object:
-        """All that the figure depends on; None: there is nothing to compute."""
+        """The values on which the figure depends; None: there is nothing to compute."""
 
     def _clear(self) -> None:
         """Take the old figure away, or mark it: another one is asked for. Do nothing by default."""
